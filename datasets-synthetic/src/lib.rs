@@ -1,0 +1,1 @@
+//! Synthetic shapes with exact ground truth.

@@ -1,0 +1,1 @@
+//! Attributed hypergraph matching.

@@ -1,0 +1,1 @@
+//! Medial scaffolds of anatomical shapes.

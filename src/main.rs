@@ -1,0 +1,2 @@
+//! The medial command.
+fn main() {}
