@@ -1,0 +1,1 @@
+//! Regularise: homotopy-preserving simplification, cheapest first.
