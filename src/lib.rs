@@ -39,3 +39,5 @@ pub mod fine_scaffold;
 pub mod regularise;
 
 pub mod coarse_scaffold;
+
+pub mod reports;

@@ -1,0 +1,27 @@
+//! Results as files that people and other programs open.
+//!
+//! In: what the stages made. Out, in the order of this list:
+//! - [`atomic`]: every file is written whole, under a temporary name, then renamed;
+//! - [`mesh_files`]: PLY with fields, STL, OBJ, OFF;
+//! - [`vtp`]: sheets and curves for ParaView and 3D Slicer;
+//! - [`medial_files`]: `fine.ma`, ITK transforms, CSV tables;
+//! - [`colour`], [`scene`], [`glb`]: what is shown in 3D, as layers and as binary glTF;
+//!
+//! Coordinates are LPS mm in every file, and every format that can say so does. Bytes depend on the data alone.
+
+pub mod atomic;
+pub mod colour;
+pub mod glb;
+pub mod medial_files;
+pub mod mesh_files;
+pub mod scene;
+pub mod vtp;
+
+pub use atomic::{WriteError, write_atomically, write_bytes, write_json};
+pub use glb::{glb_bytes, scene_from_glb};
+pub use medial_files::{MedialMesh, write_csv, write_ma, write_tfm};
+pub use mesh_files::{
+    FieldValues, PlyEncoding, VertexField, write_mesh, write_obj, write_off, write_ply, write_stl,
+};
+pub use scene::{CorrespondenceLine, Layer, LayerKind, Quantity, Scene};
+pub use vtp::{PolyData, curves_polydata, sheets_polydata, write_vtp};
