@@ -1,0 +1,242 @@
+//! Graduated assignment of two hypergraphs: coupled soft maps of nodes, curves and sheets.
+//!
+//! In: a [`MatchingProblem`], a [`MatchSettings`], optionally hypotheses. Out: a [`HypergraphMatch`].
+//!
+//! 1. For every start (uniform, spectral, the hypotheses): anneal, discretise, ascend, local search.
+//! 2. Keep the greatest gain; ties go to the earliest start.
+//! 3. Report the price in the weights' unit, the similarity `1 - price / total`, and every pair's soft confidence.
+//!
+//! Cost: a start takes a few hundred gradient steps, each O(I_target I_source) for I incidences.
+
+use super::anneal::{AnnealSettings, anneal};
+use super::discrete::Discrete;
+use super::objective::{HypergraphObjective, Objective};
+use super::starts::{self, StartKind};
+use crate::matching_problem::{ElementMap, MatchingProblem};
+use crate::table::Table;
+use serde::{Deserialize, Serialize};
+
+/// How to match hypergraphs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MatchSettings {
+    /// Cooling of every start.
+    pub anneal: AnnealSettings,
+    /// Use the uniform start.
+    pub uniform_start: bool,
+    /// Use the spectral start.
+    pub spectral_start: bool,
+    /// How much of a hypothesis' start is the hypothesis itself, in [0, 1].
+    pub hypothesis_trust: f64,
+    /// Most moves of one local search.
+    pub max_moves: usize,
+}
+
+impl Default for MatchSettings {
+    fn default() -> Self {
+        Self {
+            anneal: AnnealSettings::default(),
+            uniform_start: true,
+            spectral_start: true,
+            hypothesis_trust: 0.8,
+            max_moves: 10_000,
+        }
+    }
+}
+
+/// One matched pair.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MatchedPair {
+    /// Target element.
+    pub target: u32,
+    /// Source element.
+    pub source: u32,
+    /// Soft assignment at the end of annealing, in [0, 1]: near 1 when nothing competes.
+    pub confidence: f64,
+    /// Gain of the pair in the match it is in (its own and its couplings'), in the weights' unit: what the match
+    /// would lose without it.
+    pub gain: f64,
+}
+
+/// A match of two hypergraphs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HypergraphMatch {
+    /// Matched nodes, by target.
+    pub nodes: Vec<MatchedPair>,
+    /// Matched curves, by target.
+    pub curves: Vec<MatchedPair>,
+    /// Matched sheets, by target.
+    pub sheets: Vec<MatchedPair>,
+    /// The same as a map.
+    pub map: ElementMap,
+    /// Price of the match: an upper bound of the edit distance, in the weights' unit.
+    pub price: f64,
+    /// `1 - price / (price of matching nothing)`: 1 for equal graphs, 0 when nothing matches; 1 when both are empty.
+    pub similarity: f64,
+    /// The start that led here.
+    pub start: StartKind,
+    /// Prices of all starts' ends, in the order tried, for judging how ambiguous the match is.
+    pub prices: Vec<f64>,
+    /// Whether that start's annealing settled.
+    pub converged: bool,
+}
+
+/// Matches `source` to `target`.
+///
+/// # Complexity
+/// About 25 temperatures of at most 4 steps a start; a step is O(I I' + n n') for I incidences and n elements.
+///
+/// # Example
+/// ```
+/// use matchers::graduated_assignment::{MatchSettings, match_hypergraphs};
+/// use matchers::matching_problem::AttributeScales;
+/// use matchers::*;
+/// let mut g = AttributedHypergraph::new();
+/// let a = g.add_node(1.0, vec![2.0]).unwrap();
+/// let b = g.add_node(1.0, vec![5.0]).unwrap();
+/// g.add_curve(CurveEnds::Two(a, b), 3.0, vec![10.0]).unwrap();
+/// let scales = AttributeScales { nodes: vec![0.5], curves: vec![0.1], sheets: vec![] };
+/// let costs = ElementCosts::from_attributes(&g, &g, &scales).unwrap();
+/// let problem = MatchingProblem::new(&g, &g, &costs, &EvidenceSettings::default()).unwrap();
+/// let found = match_hypergraphs(&problem, &[], &MatchSettings::default());
+/// assert_eq!(found.price, 0.0);
+/// assert_eq!((found.nodes[1].target, found.nodes[1].source), (1, 1));
+/// ```
+pub fn match_hypergraphs(
+    problem: &MatchingProblem,
+    hypotheses: &[ElementMap],
+    settings: &MatchSettings,
+) -> HypergraphMatch {
+    let objective = HypergraphObjective::new(problem);
+    let mut kinds = Vec::new();
+    if settings.uniform_start {
+        kinds.push(StartKind::Uniform);
+    }
+    if settings.spectral_start {
+        kinds.push(StartKind::Spectral);
+    }
+    kinds.extend((0..hypotheses.len()).map(StartKind::Hypothesis));
+    if kinds.is_empty() {
+        kinds.push(StartKind::Uniform);
+    }
+    let mut best: Option<Candidate> = None;
+    let mut prices = Vec::new();
+    for kind in kinds {
+        let candidate = run_start(problem, &objective, kind, hypotheses, settings);
+        prices.push(candidate.price);
+        if best.as_ref().is_none_or(|b| candidate.price < b.price) {
+            best = Some(candidate);
+        }
+    }
+    let best = best.expect("there is at least one start");
+    report(problem, best, prices)
+}
+
+struct Candidate {
+    state: Discrete,
+    soft: Vec<Table>,
+    price: f64,
+    start: StartKind,
+    converged: bool,
+}
+
+fn run_start(
+    problem: &MatchingProblem,
+    objective: &HypergraphObjective,
+    kind: StartKind,
+    hypotheses: &[ElementMap],
+    settings: &MatchSettings,
+) -> Candidate {
+    let start = match kind {
+        StartKind::Uniform => starts::uniform(objective),
+        StartKind::Spectral => starts::spectral(objective),
+        StartKind::Hypothesis(k) => {
+            starts::hypothesis(objective, &columns_of(&hypotheses[k]), settings.hypothesis_trust)
+        }
+    };
+    let annealed = anneal(objective, start, &settings.anneal);
+    let mut state = polish(
+        objective,
+        Discrete::from_soft(objective, &annealed.soft),
+        settings,
+    );
+    if let StartKind::Hypothesis(k) = kind {
+        // Annealing may leave the hypothesis; its own polished end competes too.
+        let kept = polish(
+            objective,
+            Discrete::from_columns(objective, &columns_of(&hypotheses[k])),
+            settings,
+        );
+        if kept.gain > state.gain {
+            state = kept;
+        }
+    }
+    let price = problem.price(&map_of(&state));
+    Candidate {
+        state,
+        soft: annealed.soft,
+        price,
+        start: kind,
+        converged: annealed.converged,
+    }
+}
+
+fn polish(objective: &impl Objective, mut state: Discrete, settings: &MatchSettings) -> Discrete {
+    loop {
+        let mut improved = state.ascend(objective);
+        improved |= state.local_search(objective, settings.max_moves);
+        if !improved {
+            return state;
+        }
+    }
+}
+
+fn columns_of(map: &ElementMap) -> Vec<Vec<Option<usize>>> {
+    map.source_of_target
+        .iter()
+        .map(|m| m.iter().map(|y| y.map(|y| y as usize)).collect())
+        .collect()
+}
+
+fn map_of(state: &Discrete) -> ElementMap {
+    let list = |k: usize| state.col_of_row[k].iter().map(|c| c.map(|c| c as u32)).collect();
+    ElementMap {
+        source_of_target: [list(0), list(1), list(2)],
+    }
+}
+
+fn report(problem: &MatchingProblem, best: Candidate, prices: Vec<f64>) -> HypergraphMatch {
+    let map = map_of(&best.state);
+    let pairs = |kind: usize| -> Vec<MatchedPair> {
+        let matched = map.source_of_target[kind].iter().enumerate();
+        matched
+            .filter_map(|(x, y)| {
+                let y = (*y)?;
+                let place = (x, y as usize);
+                let confidence = best.soft[kind][place].clamp(0.0, 1.0);
+                let gain = best.state.gradient[kind][place];
+                Some(MatchedPair {
+                    target: x as u32,
+                    source: y,
+                    confidence,
+                    gain,
+                })
+            })
+            .collect()
+    };
+    let total = problem.total();
+    HypergraphMatch {
+        nodes: pairs(0),
+        curves: pairs(1),
+        sheets: pairs(2),
+        price: best.price,
+        similarity: if total > 0.0 {
+            1.0 - best.price / total
+        } else {
+            1.0
+        },
+        start: best.start,
+        prices,
+        converged: best.converged,
+        map,
+    }
+}
