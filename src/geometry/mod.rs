@@ -2,14 +2,18 @@
 //! motions, lengths with units, neighbours, closest points, inside and outside. Topology modules take ids only; coordinates
 //! enter by name.
 
+pub mod circumsphere;
 pub mod closest;
+mod expansion;
 pub mod ids;
 pub mod length;
 pub mod mesh;
 pub mod neighbours;
+pub mod predicates;
 pub mod rigid;
 pub mod winding;
 
+pub use circumsphere::Sphere;
 pub use closest::{ClosestOnMesh, ClosestPoint, SignedDistance};
 pub use ids::{CurveId, NodeId, SheetId, TetId, VertexId};
 pub use length::{Length, LengthError, LengthScale};

@@ -1,0 +1,299 @@
+//! The door: checks the points, puts them into lexicographic order and merges equal ones.
+//!
+//! In: points as they come. Out: [`Generators`]: distinct points in order, how often each came, and where every input
+//! point went; and a [`Frame`], the power of two that brings coordinates to a magnitude at which no predicate can over- or
+//! underflow. Steps: (1) finite check, (2) `-0.0` becomes `0.0`, (3) sort by (x, y, z), (4) merge equal points, (5) check
+//! that the range of exponents can be handled exactly. Cost: `O(n log n)`, `O(n)` when the points come sorted.
+
+use crate::geometry::predicates::lexicographic;
+use glam::DVec3;
+use rayon::prelude::*;
+use thiserror::Error;
+
+/// Distinct points in lexicographic order with the way back to the input.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Generators {
+    /// Distinct points, mm, sorted by (x, y, z); no negative zeros.
+    pub points: Vec<DVec3>,
+    /// For each input point, the index of its generator.
+    pub source: Vec<u32>,
+    /// For each generator, the number of input points merged into it, at least 1.
+    pub multiplicity: Vec<u32>,
+}
+
+/// Why points were refused.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum DelaunayError {
+    /// A coordinate is NaN or infinite.
+    #[error("point {index} has the coordinate {value}; remove it or repair the file")]
+    NotFinite {
+        /// Index of the point in the input.
+        index: usize,
+        /// The coordinate.
+        value: f64,
+    },
+    /// Coordinates differ so much in magnitude that their products leave the range of `f64`.
+    #[error(
+        "point {index} has the coordinate {value:e} beside one of size {largest:e}; exact tests span 2^338 (about 1e101) \
+         from the largest coordinate to the last bit of the smallest: round such coordinates to 0"
+    )]
+    Range {
+        /// Index of the point in the input.
+        index: usize,
+        /// The coordinate.
+        value: f64,
+        /// The largest magnitude of a coordinate.
+        largest: f64,
+    },
+    /// More points than ids.
+    #[error("{count} points; the limit is {limit}: thin the cloud or split it")]
+    TooMany {
+        /// Number of points.
+        count: usize,
+        /// Largest number that is accepted.
+        limit: usize,
+    },
+}
+
+/// Tetrahedra are packed as `4 * id + facet` in 32 bits, and there can be about seven a point.
+pub const MAX_POINTS: usize = (u32::MAX / 4 / 8) as usize;
+
+/// The largest coordinate is brought below `2^TOP`: the sixth power of a difference then stays below `2^1020`.
+const TOP: i32 = 160;
+/// Every coordinate is then a multiple of `2^BOTTOM`: the sixth power stays above `2^-1074`, the last bit of `f64`.
+const BOTTOM: i32 = -178;
+
+/// The power of two between the points as given and the points the predicates see. Multiplying by it is exact, so order,
+/// orientation and empty spheres are unchanged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frame {
+    /// `normalised = given * 2^exponent`.
+    pub exponent: i32,
+}
+
+impl Frame {
+    /// The frame of finite points, or the error that says which of them spans too wide a range. Clouds of ordinary
+    /// magnitude (coordinates and their last bits between `2^BOTTOM` and `2^TOP`) are left as they are.
+    pub fn of(points: &[DVec3]) -> Result<Self, DelaunayError> {
+        let [lo, hi] = exponents(points);
+        if hi < lo || (lo >= BOTTOM && hi <= TOP) {
+            return Ok(Self { exponent: 0 });
+        }
+        let frame = Self { exponent: TOP - hi };
+        if lo + frame.exponent >= BOTTOM {
+            return Ok(frame);
+        }
+        let magnitudes = points.iter().flat_map(|p| p.abs().to_array());
+        let largest = magnitudes.fold(0.0, f64::max);
+        let coordinates = points
+            .iter()
+            .enumerate()
+            .flat_map(|(i, p)| p.to_array().map(|v| (i, v)));
+        let (index, value) = coordinates
+            .filter(|&(_, v)| v != 0.0)
+            .min_by_key(|&(_, v)| last_bit(v))
+            .expect("a cloud with a range of exponents has a coordinate that is not zero");
+        Err(DelaunayError::Range {
+            index,
+            value,
+            largest,
+        })
+    }
+
+    /// A point in the frame, exactly.
+    #[inline]
+    pub fn apply(self, p: DVec3) -> DVec3 {
+        if self.exponent == 0 {
+            p
+        } else {
+            scale(p, self.exponent)
+        }
+    }
+
+    /// A length or coordinate of the frame back in the units of the input; rounds only when it leaves the normal range.
+    #[inline]
+    pub fn restore(self, v: f64) -> f64 {
+        if self.exponent == 0 {
+            v
+        } else {
+            scale(DVec3::splat(v), -self.exponent).x
+        }
+    }
+}
+
+/// `p * 2^e`, in two steps so that the factors stay in range.
+fn scale(p: DVec3, e: i32) -> DVec3 {
+    let half = e / 2;
+    let power = |e: i32| f64::powi(2.0, e);
+    // |e| <= 1074 + TOP, so both halves are normal numbers.
+    p * power(half) * power(e - half)
+}
+
+/// Smallest exponent of a last set bit and exponent above the largest magnitude; `lo > hi` when all is zero.
+fn exponents(points: &[DVec3]) -> [i32; 2] {
+    let mut lo = i32::MAX;
+    let mut hi = i32::MIN;
+    for v in points.iter().flat_map(|p| p.to_array()).filter(|&v| v != 0.0) {
+        lo = lo.min(last_bit(v));
+        hi = hi.max(top_bit(v));
+    }
+    [lo, hi]
+}
+
+/// Significand as an integer and its exponent: `|v| = m * 2^e`.
+fn decompose(v: f64) -> (u64, i32) {
+    let bits = v.to_bits();
+    let e = ((bits >> 52) & 0x7ff) as i32;
+    let m = bits & ((1 << 52) - 1);
+    if e == 0 {
+        (m, -1074)
+    } else {
+        (m | 1 << 52, e - 1075)
+    }
+}
+
+/// Exponent of the last set bit of a non-zero number.
+fn last_bit(v: f64) -> i32 {
+    let (m, e) = decompose(v);
+    e + m.trailing_zeros() as i32
+}
+
+/// Smallest `k` with `|v| < 2^k`.
+fn top_bit(v: f64) -> i32 {
+    let (m, e) = decompose(v);
+    e + 64 - m.leading_zeros() as i32
+}
+
+/// Checks, sorts and merges points; see the module.
+///
+/// # Errors
+/// [`DelaunayError`] names the first point that cannot be used.
+///
+/// ```
+/// # use glam::DVec3;
+/// # use medial_scaffold::delaunay::door::prepare;
+/// let g = prepare(&[DVec3::X, DVec3::ZERO, DVec3::X])?;
+/// assert_eq!(g.points, [DVec3::ZERO, DVec3::X]);
+/// assert_eq!((g.source, g.multiplicity), (vec![1, 0, 1], vec![1, 2]));
+/// # Ok::<(), medial_scaffold::delaunay::DelaunayError>(())
+/// ```
+pub fn prepare(points: &[DVec3]) -> Result<Generators, DelaunayError> {
+    check(points)?;
+    let mut out = Generators::default();
+    if is_sorted(points) {
+        out.points = points.iter().map(|&p| p + DVec3::ZERO).collect();
+        out.source = (0..points.len() as u32).collect();
+        out.multiplicity = vec![1; points.len()];
+        return Ok(out);
+    }
+    out.source = vec![0; points.len()];
+    for (p, i) in sorted(points) {
+        if out.points.last() != Some(&p) {
+            out.points.push(p);
+            out.multiplicity.push(0);
+        }
+        let last = out.points.len() - 1;
+        out.source[i as usize] = last as u32;
+        out.multiplicity[last] += 1;
+    }
+    Ok(out)
+}
+
+/// The distinct points of [`prepare`], without the way back.
+pub(super) fn distinct(points: &[DVec3]) -> Result<Vec<DVec3>, DelaunayError> {
+    check(points)?;
+    if is_sorted(points) {
+        return Ok(points.iter().map(|&p| p + DVec3::ZERO).collect());
+    }
+    // Adding zero turns -0.0 into 0.0 and leaves every other number as it is.
+    let mut out: Vec<DVec3> = points.iter().map(|&p| p + DVec3::ZERO).collect();
+    out.par_sort_unstable_by(|&a, &b| lexicographic(a, b));
+    out.dedup();
+    Ok(out)
+}
+
+/// Strictly increasing, so distinct too.
+fn is_sorted(points: &[DVec3]) -> bool {
+    points.windows(2).all(|w| lexicographic(w[0], w[1]).is_lt())
+}
+
+fn check(points: &[DVec3]) -> Result<(), DelaunayError> {
+    if points.len() > MAX_POINTS {
+        return Err(DelaunayError::TooMany {
+            count: points.len(),
+            limit: MAX_POINTS,
+        });
+    }
+    let bad = |p: &DVec3| p.to_array().into_iter().find(|v| !v.is_finite());
+    match points
+        .iter()
+        .enumerate()
+        .find_map(|(i, p)| bad(p).map(|v| (i, v)))
+    {
+        Some((index, value)) => Err(DelaunayError::NotFinite { index, value }),
+        None => Frame::of(points).map(|_| ()),
+    }
+}
+
+fn sorted(points: &[DVec3]) -> Vec<(DVec3, u32)> {
+    let mut order: Vec<(DVec3, u32)> = points
+        .iter()
+        .zip(0..)
+        .map(|(&p, i)| (p + DVec3::ZERO, i))
+        .collect();
+    order.par_sort_unstable_by(|a, b| lexicographic(a.0, b.0).then(a.1.cmp(&b.1)));
+    order
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exponents_are_those_of_the_bits() {
+        assert_eq!((last_bit(1.0), top_bit(1.0)), (0, 1));
+        assert_eq!((last_bit(-12.0), top_bit(-12.0)), (2, 4));
+        assert_eq!(
+            (
+                last_bit(f64::MIN_POSITIVE / 4.0),
+                top_bit(f64::MIN_POSITIVE / 4.0)
+            ),
+            (-1024, -1023)
+        );
+        assert_eq!(top_bit(f64::MAX), 1024);
+    }
+
+    #[test]
+    fn frames_are_exact_and_come_back() {
+        for v in [1e-300, 1e200, f64::MAX, f64::MIN_POSITIVE / 1024.0, 3.7e-310] {
+            let p = DVec3::new(v, -v / 2.0, 0.0);
+            let frame = Frame::of(&[p]).expect("one magnitude");
+            let q = frame.apply(p);
+            assert!(
+                q.x > 2f64.powi(100) && q.x <= 2f64.powi(160),
+                "{v:e} -> {:e}",
+                q.x
+            );
+            assert_eq!(frame.restore(q.x), v);
+        }
+        assert_eq!(
+            Frame::of(&[DVec3::new(1.0, 1e-17, 250.0)]).map(|f| f.exponent),
+            Ok(0)
+        );
+    }
+
+    #[test]
+    fn too_wide_a_range_is_named() {
+        let r = prepare(&[DVec3::X, DVec3::new(0.0, 1e-120, 0.0)]);
+        assert!(matches!(r, Err(DelaunayError::Range { index: 1, .. })), "{r:?}");
+        let r = prepare(&[DVec3::X, DVec3::new(0.0, f64::NAN, 0.0)]);
+        assert!(matches!(r, Err(DelaunayError::NotFinite { index: 1, .. })));
+    }
+
+    #[test]
+    fn negative_zero_is_zero() {
+        let g = prepare(&[DVec3::new(0.0, 1.0, 0.0), DVec3::new(-0.0, 1.0, -0.0)]).expect("finite");
+        assert_eq!((g.points.len(), g.multiplicity), (1, vec![2]));
+        assert!(g.points[0].x.is_sign_positive());
+    }
+}

@@ -1,0 +1,96 @@
+//! Centre and radius of the sphere through the corners of a triangle or tetrahedron.
+//!
+//! In: points. Out: [`Sphere`]. The solve works on differences from the first corner; when its condition says that more
+//! than four digits would be lost (slivers), numerator and denominator are formed exactly as expansions and divided once,
+//! so the result is right to a few units in the last place of the offset from that corner however flat the simplex is.
+//! Cost: about 60 operations, some microseconds for a sliver.
+
+use super::expansion::Vector;
+use glam::DVec3;
+
+/// A sphere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sphere {
+    /// Centre, mm.
+    pub centre: DVec3,
+    /// Radius, mm.
+    pub radius: f64,
+}
+
+/// Smallest ratio of a determinant to the sum of its terms' magnitudes at which the plain solve is kept: at 2^-14 the
+/// quotient still has 38 of its 53 bits, a relative error of 1e-11.
+const WELL_CONDITIONED: f64 = 1.0 / 16384.0;
+
+/// The sphere through the corners of a tetrahedron of non-zero volume (either orientation).
+///
+/// ```
+/// # use glam::DVec3;
+/// # use medial_scaffold::geometry::circumsphere::tetrahedron;
+/// let s = tetrahedron([DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z]);
+/// assert_eq!(s.centre, DVec3::splat(0.5));
+/// ```
+pub fn tetrahedron(corners: [DVec3; 4]) -> Sphere {
+    let a = corners[0];
+    let [u, v, w] = [corners[1] - a, corners[2] - a, corners[3] - a];
+    let vw = v.cross(w);
+    let det = u.dot(vw);
+    let size = u.abs().dot(DVec3::new(
+        (v.y * w.z).abs() + (v.z * w.y).abs(),
+        (v.z * w.x).abs() + (v.x * w.z).abs(),
+        (v.x * w.y).abs() + (v.y * w.x).abs(),
+    ));
+    let offset = if det.abs() > WELL_CONDITIONED * size {
+        let m = u.length_squared() * vw + v.length_squared() * w.cross(u) + w.length_squared() * u.cross(v);
+        m / (2.0 * det)
+    } else {
+        tetrahedron_exact(corners)
+    };
+    Sphere {
+        centre: a + offset,
+        radius: offset.length(),
+    }
+}
+
+/// Offset of the centre from the first corner, each coordinate within two units in its last place.
+#[cold]
+#[inline(never)]
+fn tetrahedron_exact(corners: [DVec3; 4]) -> DVec3 {
+    let [u, v, w] = [1, 2, 3].map(|i| Vector::difference(corners[i], corners[0]));
+    let vw = v.cross(&w);
+    let det = 2.0 * u.dot(&vw).approximate();
+    let m = vw
+        .scale(&u.dot(&u))
+        .add(&w.cross(&u).scale(&v.dot(&v)))
+        .add(&u.cross(&v).scale(&w.dot(&w)));
+    let [x, y, z] = m.0.map(|e| e.approximate() / det);
+    DVec3::new(x, y, z)
+}
+
+/// The smallest sphere through the corners of a triangle of non-zero area: its centre lies in the triangle's plane.
+pub fn triangle(corners: [DVec3; 3]) -> Sphere {
+    let a = corners[0];
+    let (u, v) = (corners[1] - a, corners[2] - a);
+    let n = u.cross(v);
+    let nn = n.length_squared();
+    let size = u.length_squared() * v.length_squared();
+    let offset = if nn > WELL_CONDITIONED * size {
+        (v.length_squared() * n.cross(u) + u.length_squared() * v.cross(n)) / (2.0 * nn)
+    } else {
+        triangle_exact(corners)
+    };
+    Sphere {
+        centre: a + offset,
+        radius: offset.length(),
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn triangle_exact(corners: [DVec3; 3]) -> DVec3 {
+    let [u, v] = [1, 2].map(|i| Vector::difference(corners[i], corners[0]));
+    let n = u.cross(&v);
+    let det = 2.0 * n.dot(&n).approximate();
+    let m = n.cross(&u).scale(&v.dot(&v)).add(&v.cross(&n).scale(&u.dot(&u)));
+    let [x, y, z] = m.0.map(|e| e.approximate() / det);
+    DVec3::new(x, y, z)
+}
