@@ -2,5 +2,12 @@
 //! 2007), read off the Delaunay triangulation.
 
 pub mod flow;
+pub mod merged;
+pub mod planar;
+pub mod scaffold;
+mod spheres;
 
 pub use flow::{CriticalCounts, FlowType};
+pub use merged::DegenerateVertex;
+pub use planar::PlanarScaffold;
+pub use scaffold::{Arc, FullScaffold, UnboundedCurve, full_scaffold};

@@ -1,7 +1,7 @@
 //! Centre and radius of the sphere through the corners of a triangle or tetrahedron.
 //!
 //! In: points. Out: [`Sphere`]. The solve works on differences from the first corner; when its condition says that more
-//! than four digits would be lost (slivers), numerator and denominator are formed exactly as expansions and divided once,
+//! than five digits would be lost (slivers), numerator and denominator are formed exactly as expansions and divided once,
 //! so the result is right to a few units in the last place of the offset from that corner however flat the simplex is.
 //! Cost: about 60 operations, some microseconds for a sliver.
 
@@ -17,8 +17,8 @@ pub struct Sphere {
     pub radius: f64,
 }
 
-/// Smallest ratio of a determinant to the sum of its terms' magnitudes at which the plain solve is kept: at 2^-14 the
-/// quotient still has 38 of its 53 bits, a relative error of 1e-11.
+/// Smallest ratio of numerator and denominator to the products of lengths that bound their terms at which the plain solve is
+/// kept. Neither has more than 17 roundings, so the quotient's relative error stays below `2 * 17 * 2^-53 * 2^14 = 6e-11`.
 const WELL_CONDITIONED: f64 = 1.0 / 16384.0;
 
 /// The sphere through the corners of a tetrahedron of non-zero volume (either orientation).
@@ -34,13 +34,12 @@ pub fn tetrahedron(corners: [DVec3; 4]) -> Sphere {
     let [u, v, w] = [corners[1] - a, corners[2] - a, corners[3] - a];
     let vw = v.cross(w);
     let det = u.dot(vw);
-    let size = u.abs().dot(DVec3::new(
-        (v.y * w.z).abs() + (v.z * w.y).abs(),
-        (v.z * w.x).abs() + (v.x * w.z).abs(),
-        (v.x * w.y).abs() + (v.y * w.x).abs(),
-    ));
-    let offset = if det.abs() > WELL_CONDITIONED * size {
-        let m = u.length_squared() * vw + v.length_squared() * w.cross(u) + w.length_squared() * u.cross(v);
+    let m = u.length_squared() * vw + v.length_squared() * w.cross(u) + w.length_squared() * u.cross(v);
+    let [lu, lv, lw] = [u.length(), v.length(), w.length()];
+    let volume = lu * lv * lw;
+    let well = det.abs() > WELL_CONDITIONED * volume
+        && m.length_squared() > (WELL_CONDITIONED * volume * (lu + lv + lw)).powi(2);
+    let offset = if well {
         m / (2.0 * det)
     } else {
         tetrahedron_exact(corners)
@@ -72,9 +71,13 @@ pub fn triangle(corners: [DVec3; 3]) -> Sphere {
     let (u, v) = (corners[1] - a, corners[2] - a);
     let n = u.cross(v);
     let nn = n.length_squared();
-    let size = u.length_squared() * v.length_squared();
-    let offset = if nn > WELL_CONDITIONED * size {
-        (v.length_squared() * n.cross(u) + u.length_squared() * v.cross(n)) / (2.0 * nn)
+    let (uu, vv) = (u.length_squared(), v.length_squared());
+    let m = vv * n.cross(u) + uu * v.cross(n);
+    let area = uu * vv;
+    let well = nn > WELL_CONDITIONED * area
+        && m.length_squared() > WELL_CONDITIONED.powi(2) * area * area * (uu.sqrt() + vv.sqrt()).powi(2);
+    let offset = if well {
+        m / (2.0 * nn)
     } else {
         triangle_exact(corners)
     };

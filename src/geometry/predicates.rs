@@ -11,7 +11,8 @@
 //!   in the lexicographic order of their coordinates (Devillers & Teillaud 2011, "Perturbations for Delaunay and weighted
 //!   Delaunay 3D triangulations"), so the answer depends on coordinates alone.
 //! * [`tri_gabriel`] and [`edge_gabriel`] are positive when the point lies strictly outside the smallest ball through the
-//!   triangle or edge; a point on that ball is outside neither strictly nor not, and is zero.
+//!   triangle or edge, negative inside, zero on it; [`tri_gabriel_perturbed`] and [`edge_gabriel_perturbed`] break that tie
+//!   by the same change of the lifted points, so that the flow they decide is that of one generic (weighted) point set.
 //!
 //! Exact while no product over- or underflows: coordinates of magnitude `2^-178` to `2^168` with differences that are
 //! multiples of `2^-178` are safe; [`crate::delaunay::door::Frame`] brings any cloud there by a power of two.
@@ -22,7 +23,10 @@ use robust::Coord3D;
 use std::cmp::Ordering;
 
 /// Half a unit in the last place of 1: the relative error of one rounded operation.
-const EPSILON: f64 = f64::EPSILON / 2.0;
+pub(crate) const EPSILON: f64 = f64::EPSILON / 2.0;
+
+/// Results below this may have lost bits to underflow; it is far above `2^-1022 / EPSILON` times the number of terms.
+pub(crate) const UNDERFLOW: f64 = 1e-280;
 
 #[inline]
 fn coord(p: DVec3) -> Coord3D<f64> {
@@ -99,11 +103,28 @@ pub fn edge_gabriel(a: DVec3, b: DVec3, d: DVec3) -> f64 {
     let (u, v) = (a - d, b - d);
     let dot = u.dot(v);
     // Two rounded differences, one product and at most two sums a term: (1 + e)^5 - 1 < 6e, and 8e covers the bound itself.
-    let bound = 8.0 * EPSILON * u.abs().dot(v.abs());
+    let bound = 8.0 * EPSILON * u.abs().dot(v.abs()) + UNDERFLOW;
     if dot.abs() > bound {
         return dot;
     }
     Vector::difference(a, d).dot(&Vector::difference(b, d)).sign()
+}
+
+/// [`edge_gabriel`] with ties broken by the coordinates: never zero for three distinct points.
+///
+/// With heights `e` added to the lifted points the power of `d` is
+/// `(d - a).(d - b) + e_d - (1 - t) e_a - t e_b`, where `t` in (0, 1) places the foot of `d` on the edge when the angle is
+/// right. The largest height decides: outside exactly when `d` is lexicographically the largest of the three.
+#[inline]
+pub fn edge_gabriel_perturbed(a: DVec3, b: DVec3, d: DVec3) -> f64 {
+    let s = edge_gabriel(a, b, d);
+    if s != 0.0 {
+        s
+    } else if lexicographic(d, a).is_gt() && lexicographic(d, b).is_gt() {
+        1.0
+    } else {
+        -1.0
+    }
 }
 
 /// Positive when the angle of the triangle `a, b, c` at `a` is acute, zero when it is right. Same polynomial as
@@ -130,7 +151,7 @@ pub fn tri_gabriel(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> f64 {
     let (au, av, aw) = (u.abs(), v.abs(), w.abs());
     let an = cross_magnitude(au, av);
     let am = vv * cross_magnitude(an, au) + uu * cross_magnitude(av, an);
-    let bound = 32.0 * EPSILON * (ww * an.length_squared() + aw.dot(am));
+    let bound = 32.0 * EPSILON * (ww * an.length_squared() + aw.dot(am)) + UNDERFLOW;
     if g.abs() > bound {
         g
     } else {
@@ -155,6 +176,39 @@ fn tri_gabriel_exact(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> f64 {
     let n = u.cross(&v);
     let m = n.cross(&u).scale(&v.dot(&v)).add(&v.cross(&n).scale(&u.dot(&u)));
     w.dot(&w).mul(&n.dot(&n)).sub(&w.dot(&m)).sign()
+}
+
+/// [`tri_gabriel`] with ties broken by the coordinates: never zero for four distinct points that span space.
+///
+/// With heights `e` added to the lifted points the power of `d` gains `e_d - alpha e_a - beta e_b - gamma e_c`, where
+/// `alpha, beta, gamma` are the barycentric coordinates of the foot of `d` in the triangle's plane. The sign is that of the
+/// first coefficient that is not zero, heights in lexicographic order, largest first.
+#[inline]
+pub fn tri_gabriel_perturbed(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> f64 {
+    let s = tri_gabriel(a, b, c, d);
+    if s != 0.0 { s } else { tri_gabriel_tie(a, b, c, d) }
+}
+
+#[cold]
+#[inline(never)]
+fn tri_gabriel_tie(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> f64 {
+    let corners = [a, b, c];
+    let mut order = [0usize, 1, 2];
+    order.sort_unstable_by(|&i, &j| lexicographic(corners[j], corners[i]));
+    for i in order {
+        if lexicographic(d, corners[i]).is_gt() {
+            return 1.0;
+        }
+        // Barycentric coordinate of the foot of d at corner i: with u from the next corner to corner i, v to the third and
+        // w to d it is ((w.u)(v.v) - (w.v)(u.v)) / |u x v|^2.
+        let base = corners[(i + 1) % 3];
+        let [u, v, w] = [corners[i], corners[(i + 2) % 3], d].map(|p| Vector::difference(p, base));
+        let weight = w.dot(&u).mul(&v.dot(&v)).sub(&w.dot(&v).mul(&u.dot(&v))).sign();
+        if weight != 0.0 {
+            return -weight;
+        }
+    }
+    1.0
 }
 
 /// Whether three points lie on one line, exactly.

@@ -100,3 +100,28 @@ pub fn tri_gabriel(a: &Point, b: &Point, c: &Point, d: &Point) -> i8 {
 pub fn edge_gabriel(a: &Point, b: &Point, d: &Point) -> i8 {
     sign(&dot(&sub(a, d), &sub(b, d)))
 }
+
+/// Circumcentre and radius of a tetrahedron, right to the last bits; `corners` gives the unit of the whole numbers.
+pub fn circumsphere(whole: &[Point], corners: &[DVec3; 4]) -> (DVec3, f64) {
+    let [u, v, w] = [1, 2, 3].map(|i| sub(&whole[i], &whole[0]));
+    let (vw, wu, uv) = (cross(&v, &w), cross(&w, &u), cross(&u, &v));
+    let (uu, vv, ww) = (dot(&u, &u), dot(&v, &v), dot(&w, &w));
+    let m: Point = std::array::from_fn(|k| &uu * &vw[k] + &vv * &wu[k] + &ww * &uv[k]);
+    let det = BigInt::from(2) * dot(&u, &vw);
+    // One coordinate tells how many whole units make one.
+    let unit = corners[0].x / ratio(&whole[0][0], &BigInt::from(1));
+    let offset = DVec3::from_array(std::array::from_fn(|k| ratio(&m[k], &det) * unit));
+    (corners[0] + offset, offset.length())
+}
+
+/// Quotient as a float, with 80 bits before rounding.
+fn ratio(a: &BigInt, b: &BigInt) -> f64 {
+    let shift = 80 + b.bits() as i64 - a.bits() as i64;
+    let q = if shift >= 0 {
+        (a << shift) / b
+    } else {
+        a / (b << -shift)
+    };
+    let digits: f64 = q.to_string().parse().expect("a number");
+    digits * f64::powi(2.0, -(shift as i32))
+}
