@@ -2,7 +2,22 @@
 //!
 //! In: the triangulation, and the known surface when the input has one. Out: [`Segregation`]: the surface mesh over the
 //! generators and the inside/outside label of every tetrahedron.
+//!
+//! * [`known_surface`]: a mesh or mask says where its surface is; one winding number a region.
 
+pub mod balls;
+pub mod error;
+pub mod flood;
+pub mod known_queries;
+pub mod known_surface;
 pub mod labels;
+mod stars;
 
-pub use labels::Segregation;
+pub use balls::Balls;
+pub use error::SegregationError;
+pub use known_queries::KnownSurface;
+pub use known_surface::{
+    KnownSurfaceReport, KnownSurfaceSegregation, KnownSurfaceSettings, RefinementPlace, RefinementReason,
+    segregate_known,
+};
+pub use labels::{Segregation, boundary_facets, boundary_triangles};
