@@ -6,11 +6,9 @@
 
 use crate::delaunay::Triangulation;
 use crate::geometry::TetId;
+use crate::geometry::circumsphere::{self, Sphere};
 use glam::DVec3;
 use rayon::prelude::*;
-
-/// A circumcentre is trusted when its four distances to the vertices agree to this share of the radius.
-const CENTRE_TOLERANCE: f64 = 1e-6;
 
 /// Circumspheres of the finite tetrahedra, indexed by [`TetId`].
 #[derive(Clone, Debug, Default)]
@@ -26,8 +24,7 @@ pub struct Balls {
 /// One circumsphere.
 #[derive(Clone, Copy)]
 struct Ball {
-    centre: DVec3,
-    radius: f64,
+    sphere: Sphere,
     flat: bool,
 }
 
@@ -39,40 +36,23 @@ impl Balls {
             .map(|t| ball(triangulation.corners(TetId(t))))
             .collect();
         Self {
-            centres: balls.iter().map(|b| b.centre).collect(),
-            radii: balls.iter().map(|b| b.radius).collect(),
+            centres: balls.iter().map(|b| b.sphere.centre).collect(),
+            radii: balls.iter().map(|b| b.sphere.radius).collect(),
             flat: balls.iter().map(|b| b.flat).collect(),
         }
     }
 }
 
-/// The circumsphere of four points, relative to the first so that digits survive far from the origin.
-fn ball([a, b, c, d]: [DVec3; 4]) -> Ball {
-    let (u, v, w) = (b - a, c - a, d - a);
-    let det = 2.0 * u.dot(v.cross(w));
-    let offset =
-        (u.length_squared() * v.cross(w) + v.length_squared() * w.cross(u) + w.length_squared() * u.cross(v))
-            / det;
-    let radius = offset.length();
-    let spread = [u, v, w]
-        .iter()
-        .map(|x| ((*x - offset).length() - radius).abs())
-        .fold(0.0, f64::max);
-    if radius.is_finite() && spread <= CENTRE_TOLERANCE * radius {
-        return Ball {
-            centre: a + offset,
-            radius,
-            flat: false,
-        };
+/// The circumsphere of four points, or a stand-in when they lie in a plane.
+fn ball(corners: [DVec3; 4]) -> Ball {
+    let sphere = circumsphere::tetrahedron(corners);
+    if sphere.centre.is_finite() && sphere.radius.is_finite() {
+        return Ball { sphere, flat: false };
     }
-    let centre = a + (u + v + w) / 4.0;
-    let radius = [a, b, c, d]
-        .iter()
-        .map(|x| (*x - centre).length())
-        .fold(0.0, f64::max);
+    let centre = corners.iter().sum::<DVec3>() / 4.0;
+    let radius = corners.iter().map(|x| x.distance(centre)).fold(0.0, f64::max);
     Ball {
-        centre,
-        radius,
+        sphere: Sphere { centre, radius },
         flat: true,
     }
 }
@@ -84,16 +64,16 @@ mod tests {
     #[test]
     fn a_regular_corner_and_a_flat_square() {
         let b = ball([DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z]);
-        assert!((b.centre - DVec3::splat(0.5)).length() < 1e-15 && !b.flat);
-        assert!((b.radius - 0.75f64.sqrt()).abs() < 1e-15);
+        assert!((b.sphere.centre - DVec3::splat(0.5)).length() < 1e-15 && !b.flat);
+        assert!((b.sphere.radius - 0.75f64.sqrt()).abs() < 1e-15);
         let square = ball([DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y]);
-        assert!(square.flat && square.radius.is_finite() && square.centre.is_finite());
+        assert!(square.flat && square.sphere.radius.is_finite() && square.sphere.centre.is_finite());
     }
 
     #[test]
     fn far_from_the_origin_the_centre_keeps_its_digits() {
         let far = DVec3::new(1e5, -2e5, 3e5);
         let b = ball([far, far + DVec3::X, far + DVec3::Y, far + DVec3::Z]);
-        assert!((b.centre - far - DVec3::splat(0.5)).length() < 1e-9);
+        assert!((b.sphere.centre - far - DVec3::splat(0.5)).length() < 1e-9);
     }
 }

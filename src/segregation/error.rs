@@ -56,6 +56,6 @@ pub enum SegregationError {
         points: usize,
     },
     /// The triangulation refused the prepared points.
-    #[error("the prepared points cannot be triangulated: {0}")]
-    Triangulation(String),
+    #[error("the points cannot be triangulated: {0}")]
+    Triangulation(#[from] crate::delaunay::DelaunayError),
 }

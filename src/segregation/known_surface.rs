@@ -40,13 +40,25 @@ pub trait SurfaceQueries: Sync {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct KnownSurfaceSettings {
-    /// List at most this many places for refinement. More than this would be a re-sampling, not a repair.
+    /// List at most this many places for refinement, those farthest from the generators first.
     pub max_places: usize,
+    /// Rounds of refinement at most ([`super::segregate_known_refined`]). Each halves the smallest feature seen; ten are
+    /// a factor of a thousand.
+    pub max_rounds: usize,
+    /// Refinement stops after this many rounds without a better topology.
+    pub max_idle_rounds: usize,
+    /// Refinement stops when the generators are this many times those given.
+    pub max_growth: f64,
 }
 
 impl Default for KnownSurfaceSettings {
     fn default() -> Self {
-        Self { max_places: 20_000 }
+        Self {
+            max_places: 2000,
+            max_rounds: 10,
+            max_idle_rounds: 4,
+            max_growth: 2.0,
+        }
     }
 }
 
@@ -270,25 +282,43 @@ fn places(
     queries: &impl SurfaceQueries,
     max_places: usize,
 ) -> Vec<RefinementPlace> {
-    let mut out = many_crossings(triangulation, balls, queries);
-    out.extend(not_disks(triangulation, balls, inside, queries));
-    if out.is_empty() {
-        out = unsampled(triangulation, surface);
+    let mut found = many_crossings(triangulation, balls, queries);
+    found.extend(not_disks(triangulation, balls, inside, queries));
+    if found.is_empty() {
+        found = unsampled(triangulation, surface);
     }
-    out.sort_by(|a, b| {
-        let (p, q) = (a.point, b.point);
-        p.x.total_cmp(&q.x)
-            .then(p.y.total_cmp(&q.y))
-            .then(p.z.total_cmp(&q.z))
-            .then(a.reason.cmp(&b.reason))
+    spread(triangulation, found, max_places)
+}
+
+/// Keeps places that are far from the generators first, and drops those nearer to a kept one than half their own distance
+/// to the generators: one new generator changes its whole surroundings, so places beside it are out of date.
+fn spread(
+    triangulation: &Triangulation,
+    found: Vec<RefinementPlace>,
+    max_places: usize,
+) -> Vec<RefinementPlace> {
+    let generators = Neighbours::new(&triangulation.points);
+    let clearance: Vec<f64> = found
+        .par_iter()
+        .map(|p| generators.nearest(p.point).map_or(0.0, |n| n.distance2.sqrt()))
+        .collect();
+    let mut order: Vec<usize> = (0..found.len()).filter(|&i| clearance[i] > 0.0).collect();
+    order.sort_by(|&i, &j| {
+        clearance[j].total_cmp(&clearance[i]).then_with(|| {
+            let (p, q) = (found[i].point, found[j].point);
+            p.x.total_cmp(&q.x)
+                .then(p.y.total_cmp(&q.y))
+                .then(p.z.total_cmp(&q.z))
+        })
     });
-    out.dedup_by(|a, b| a.point == b.point);
-    // Every k-th in coordinate order: an even thinning that does not depend on how the places were found.
-    if out.len() > max_places {
-        let step = out.len().div_ceil(max_places);
-        out = out.into_iter().step_by(step).collect();
+    let mut kept: Vec<RefinementPlace> = Vec::new();
+    for i in order {
+        let far = |k: &RefinementPlace| k.point.distance(found[i].point) >= 0.5 * clearance[i];
+        if kept.len() < max_places && kept.iter().all(far) {
+            kept.push(found[i]);
+        }
     }
-    out
+    kept
 }
 
 /// The dual Voronoi edge of a facet between two finite, non-flat tetrahedra.
