@@ -93,7 +93,7 @@ impl Neighbours {
             .nearest_n::<SquaredEuclidean<f64>>(wanted)
             .execute()
             .iter()
-            .map(|hit| self.neighbour(query, hit.item as u32))
+            .map(|hit| self.neighbour(query, hit.item))
             .collect();
         sort(&mut found);
         if found.len() > k {
@@ -117,7 +117,7 @@ impl Neighbours {
             .within::<SquaredEuclidean<f64>>(radius2 * ROUNDING)
             .execute()
             .iter()
-            .map(|hit| self.neighbour(query, hit.item as u32))
+            .map(|hit| self.neighbour(query, hit.item))
             .filter(|n| n.distance2 <= radius2)
             .collect();
         sort(&mut found);

@@ -1,5 +1,20 @@
 //! Input: a file becomes a [`Shape`] in LPS millimetres; nothing is repaired silently.
+//!
+//! * [`read`]: the front door, [`read_shape`]; frame, units, label, what cannot be used.
+//! * `formats`: one reader a format, on a cursor that knows its place (`scan`, `scalar`, `decompress`).
+//! * [`error`]: what can be wrong and how it is said.
+//! * [`shape`]: what comes out.
 
+mod decompress;
+pub mod error;
+mod formats;
+mod parsed;
+pub mod read;
+mod scalar;
+mod scan;
 pub mod shape;
 
-pub use shape::{Generators, Geometry, LabelMap, PointCloud, Provenance, Shape, SourceFormat};
+pub use error::{Fault, Flaw, Place, ReadError};
+pub use parsed::{Frame, Units};
+pub use read::{ReadSettings, read_bytes, read_shape};
+pub use shape::{Generators, Geometry, LabelCount, LabelMap, PointCloud, Provenance, Shape, SourceFormat};

@@ -3,7 +3,7 @@
 use crate::geometry::TriangleMesh;
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::{collections::BTreeMap, path::PathBuf};
 
 /// A shape as read: geometry in LPS mm and where it came from.
 #[derive(Clone, Debug)]
@@ -38,6 +38,15 @@ pub struct PointCloud {
     pub normals: Vec<DVec3>,
 }
 
+/// A label and how many voxels have it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LabelCount {
+    /// The label.
+    pub label: i32,
+    /// Its voxels.
+    pub voxels: u64,
+}
+
 /// A label map on a regular, possibly anisotropic and oblique grid.
 ///
 /// Voxel `(i, j, k)` is `values[i + dims[0] * (j + dims[1] * k)]`; its centre in LPS mm is
@@ -62,6 +71,21 @@ impl LabelMap {
         self.origin + self.direction * (self.spacing_mm * index_vox)
     }
 
+    /// The labels in use with their voxel counts, by label; background is left out.
+    pub fn label_counts(&self) -> Vec<LabelCount> {
+        let mut counts: BTreeMap<i32, u64> = BTreeMap::new();
+        // Runs of equal voxels are long; counting them first spares most look-ups.
+        for run in self.values.chunk_by(|a, b| a == b) {
+            if run[0] != 0 {
+                *counts.entry(run[0]).or_default() += run.len() as u64;
+            }
+        }
+        counts
+            .into_iter()
+            .map(|(label, voxels)| LabelCount { label, voxels })
+            .collect()
+    }
+
     /// Volume of one voxel, mm^3.
     pub fn voxel_volume_mm3(&self) -> f64 {
         (self.spacing_mm.x * self.spacing_mm.y * self.spacing_mm.z * self.direction.determinant()).abs()
@@ -81,6 +105,7 @@ pub enum SourceFormat {
     Csv,
     VtkLegacy,
     Vtp,
+    Medit,
     Gifti,
     Nifti,
     Nrrd,
