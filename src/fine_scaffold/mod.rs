@@ -3,7 +3,15 @@
 //! In: the triangulation and the inside labels. Out: [`FineScaffold`]: vertices (inside tetrahedra), edges (triangles
 //! between two of them), facets (Delaunay edges with a closed ring of inside tetrahedra) and 3-cells (generators whose whole star is
 //! inside), each with radius and generators.
+//!
+//! * [`complex`]: the complex as data, and its Betti numbers;
+//! * [`build`]: [`fine_scaffold`], the front function;
+//! * [`solid`]: the solid's Betti numbers by another route, to check against.
 
+pub mod build;
 pub mod complex;
+pub mod solid;
 
+pub use build::{FineScaffoldError, FineScaffoldSettings, Side, fine_scaffold};
 pub use complex::{Betti, FineScaffold};
+pub use solid::{mesh_betti, solid_betti};

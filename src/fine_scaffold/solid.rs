@@ -1,0 +1,132 @@
+//! Betti numbers of the solid by a route that knows nothing of the dual complex.
+//!
+//! In: the triangulation and the labels, or a closed mesh. Out: [`Betti`].
+//!
+//! The interior of the union of inside tetrahedra is an open 3-manifold; shrunk a little it is compact, and its boundary is
+//! the surface of the union *unpinched*: where the surface touches itself along an edge or in a vertex, the sides are told
+//! apart by walking through the solid. For a compact 3-manifold in space `b0` counts components, `b2` the
+//! boundary components less `b0`, and half the Euler number of the boundary is `b0 - b1 + b2` (Hatcher, Algebraic Topology,
+//! 3.3 and Alexander duality). Cost `O(tetrahedra)`.
+
+use super::build::Side;
+use super::complex::{Betti, NONE};
+use crate::delaunay::{Facet, Triangulation};
+use crate::geometry::TriangleMesh;
+use crate::geometry::mesh::DisjointSets;
+use crate::segregation::Segregation;
+
+/// Betti numbers of the interior of the union of the tetrahedra of one side.
+pub fn solid_betti(triangulation: &Triangulation, segregation: &Segregation, side: Side) -> Betti {
+    let of_side = |t| triangulation.is_finite(t) && segregation.is_inside(t) == (side == Side::Interior);
+    let mut parts = DisjointSets::new(triangulation.num_tets());
+    let mut b0 = 0i64;
+    let mut boundary = Vec::new();
+    let mut slot = vec![NONE; 4 * triangulation.num_finite()];
+    for tet in triangulation.finite_tets().filter(|&t| of_side(t)) {
+        b0 += 1;
+        for index in 0..4u8 {
+            let facet = Facet { tet, index };
+            let next = triangulation.mirror(facet).tet;
+            if !of_side(next) {
+                slot[4 * tet.index() + index as usize] = boundary.len() as u32;
+                boundary.push(facet);
+            }
+        }
+    }
+    for tet in triangulation.finite_tets().filter(|&t| of_side(t)) {
+        for index in 0..4 {
+            let next = triangulation.neighbour(tet, index);
+            if of_side(next) {
+                b0 -= i64::from(parts.union(tet.0, next.0));
+            }
+        }
+    }
+    let mut surfaces = DisjointSets::new(boundary.len());
+    let mut corners = DisjointSets::new(4 * boundary.len());
+    let slot_of = |f: Facet| slot[4 * f.tet.index() + f.index as usize];
+    for (i, &facet) in boundary.iter().enumerate() {
+        let i = i as u32;
+        for opposite in (0..4).filter(|&k| k != facet.index as usize) {
+            let other = across(triangulation, &of_side, facet, opposite);
+            surfaces.union(i, slot_of(other));
+            for place in (0..4).filter(|&k| k != facet.index as usize && k != opposite) {
+                let v = triangulation.tet(facet.tet)[place];
+                if let Some(k) = triangulation.tet(other.tet).iter().position(|&w| w == v) {
+                    corners.union(4 * i + place as u32, 4 * slot_of(other) + k as u32);
+                }
+            }
+        }
+    }
+    let mut vertices = 0i64;
+    let mut components = 0i64;
+    for (i, &facet) in boundary.iter().enumerate() {
+        let i = i as u32;
+        components += i64::from(surfaces.find(i) == i);
+        for place in (0..4u32).filter(|&k| k != u32::from(facet.index)) {
+            vertices += i64::from(corners.find(4 * i + place) == 4 * i + place);
+        }
+    }
+    let triangles = boundary.len() as i64;
+    let euler = vertices - 3 * triangles / 2 + triangles;
+    let b2 = components - b0;
+    Betti {
+        b0,
+        b1: b0 + b2 - euler / 2,
+        b2,
+    }
+}
+
+/// The boundary facet met when turning from `facet` through the solid about its edge that misses corner `opposite`.
+fn across(
+    triangulation: &Triangulation,
+    of_side: &impl Fn(crate::geometry::TetId) -> bool,
+    facet: Facet,
+    opposite: usize,
+) -> Facet {
+    // The edge is kept; `pivot` is the corner of the current tetrahedron not on the facet last crossed.
+    let mut at = facet.tet;
+    let mut exit = opposite;
+    let mut entered = facet.index as usize;
+    loop {
+        let out = Facet {
+            tet: at,
+            index: exit as u8,
+        };
+        let mirror = triangulation.mirror(out);
+        if !of_side(mirror.tet) {
+            return out;
+        }
+        // In the next tetrahedron leave opposite the corner of the crossed facet that is not on the edge: the old `entered`.
+        let kept = triangulation.tet(at)[entered];
+        at = mirror.tet;
+        entered = mirror.index as usize;
+        exit = triangulation
+            .tet(at)
+            .iter()
+            .position(|&v| v == kept)
+            .expect("a corner of the crossed facet is in both tetrahedra");
+    }
+}
+
+/// Betti numbers of the solid bounded by a closed, oriented mesh without self-intersections: outward components bound pieces,
+/// inward ones bound cavities. `None` when the mesh is open, not consistently oriented, or pinched.
+pub fn mesh_betti(mesh: &TriangleMesh) -> Option<Betti> {
+    let topology = mesh.topology();
+    if !topology.watertight
+        || !topology.oriented
+        || topology.nonmanifold_vertices > 0
+        || topology.euler % 2 != 0
+    {
+        return None;
+    }
+    let mut betti = Betti::default();
+    for part in mesh.components() {
+        if mesh.submesh(&part).signed_volume() > 0.0 {
+            betti.b0 += 1;
+        } else {
+            betti.b2 += 1;
+        }
+    }
+    betti.b1 = betti.b0 + betti.b2 - topology.euler / 2;
+    Some(betti)
+}

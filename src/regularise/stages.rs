@@ -1,0 +1,283 @@
+//! The stages of the regularisation in their order, and the result.
+
+use super::burn::burn;
+use super::cells::remove_cells;
+use super::collapse::{WireFire, collapse_facets};
+use super::complex::{Alive, Complex, Step};
+use super::cover::Cover;
+use super::fidelity::{self, Fidelity};
+use super::fins::trim_fins;
+use super::grow::{grow_sheets, grow_wires};
+use super::history::{Event, Kind};
+use super::measure::{Measure, Tolerance};
+use super::seams::find_seams;
+use super::settings::{Cost, RegulariseError, RegulariseSettings};
+use super::splice::Splicer;
+use super::wires::remove_small_wires;
+use crate::fine_scaffold::{Betti, FineScaffold};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// Betti numbers after a stage.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StageBetti {
+    /// Stage.
+    pub stage: String,
+    /// Betti numbers of the complex after it.
+    pub betti: Betti,
+}
+
+/// A regularised scaffold: a subcomplex of the fine scaffold, graded.
+#[derive(Clone, Debug)]
+pub struct Regularised {
+    /// What is left of the fine scaffold.
+    pub alive: Alive,
+    /// Erosion thickness of every facet of the fine scaffold, mm; infinite where no fire comes (closed sheets).
+    pub erosion_mm: Vec<f64>,
+    /// Erosion thickness of the vertices that the fire on wires has reached, mm; NaN elsewhere.
+    pub wire_erosion_mm: Vec<f64>,
+    /// Seams as paths of edges, each from the end of an axial curve.
+    pub seams: Vec<Vec<u32>>,
+    /// Every elementary step in order; [`super::replay`] makes `alive` of it.
+    pub log: Vec<Step>,
+    /// What was done, in order, with costs.
+    pub history: Vec<Event>,
+    /// Betti numbers of the fine scaffold and after every stage; all equal.
+    pub betti: Vec<StageBetti>,
+    /// Distance from the generators to the union of the medial balls that are left.
+    pub fidelity: Fidelity,
+    /// The tolerance, mm; with a tolerance relative to the radius, that at the largest radius.
+    pub tolerance_mm: f64,
+}
+
+impl Regularised {
+    /// The Betti numbers, the same at every stage.
+    pub fn betti(&self) -> Betti {
+        self.betti.last().map(|s| s.betti).unwrap_or_default()
+    }
+}
+
+/// Times that growing back is tried anew with the offending pieces restored, before everything that offends without
+/// growing back is restored, which always succeeds.
+const ATTEMPTS: usize = 4;
+
+/// Simplifies a fine scaffold; see the module for the stages.
+///
+/// # Errors
+/// A setting out of range, or [`RegulariseError::Topology`] should a stage ever change the Betti numbers.
+///
+/// # Complexity
+/// `O(n log n)` in the size of the fine scaffold.
+pub fn regularise(fine: &FineScaffold, settings: &RegulariseSettings) -> Result<Regularised, RegulariseError> {
+    settings.check()?;
+    let mut run = Run::new(fine, settings);
+    run.checked("fine scaffold")?;
+    run.stage(Kind::Cells, |run| remove_cells(&mut run.complex));
+    run.checked("3-cells")?;
+    run.burn();
+    run.stage(Kind::Collapse, Run::collapse);
+    run.checked("collapse")?;
+    let mut cover = Cover::new(&run.complex, &run.measure, None);
+    run.simplify(&mut cover);
+    run.checked("splice and trim")?;
+    let distances = run.grow_within_tolerance(&cover);
+    run.checked("grow back")?;
+    let seams = find_seams(&run.complex, &run.measure, settings, &mut run.history);
+    let fidelity = Fidelity::of(&distances, &cover);
+    Ok(run.finish(seams, fidelity))
+}
+
+struct Run<'a> {
+    fine: &'a FineScaffold,
+    settings: &'a RegulariseSettings,
+    complex: Complex<'a>,
+    measure: Measure,
+    fire: WireFire,
+    /// Erosion thickness of facets, mm and in tolerances.
+    erosion: Vec<f64>,
+    relative: Vec<f64>,
+    history: Vec<Event>,
+    betti: Vec<StageBetti>,
+}
+
+impl<'a> Run<'a> {
+    fn new(fine: &'a FineScaffold, settings: &'a RegulariseSettings) -> Self {
+        Self {
+            fine,
+            settings,
+            complex: Complex::new(fine),
+            measure: Measure::new(fine, Tolerance::new(settings.tolerance, fine)),
+            fire: WireFire::new(fine.num_vertices()),
+            erosion: Vec::new(),
+            relative: Vec::new(),
+            history: Vec::new(),
+            betti: Vec::new(),
+        }
+    }
+
+    /// Records the Betti numbers after a stage and compares them with those before.
+    fn checked(&mut self, stage: &'static str) -> Result<(), RegulariseError> {
+        let after = self.complex.betti();
+        if let Some(last) = self.betti.last()
+            && last.betti != after
+        {
+            return Err(RegulariseError::Topology {
+                stage,
+                before: last.betti,
+                after,
+            });
+        }
+        self.betti.push(StageBetti {
+            stage: stage.to_owned(),
+            betti: after,
+        });
+        Ok(())
+    }
+
+    /// Runs a stage that is one event of the history.
+    fn stage(&mut self, kind: Kind, work: impl FnOnce(&mut Self)) {
+        let first = self.complex.log.len();
+        work(self);
+        let last = self.complex.log.len();
+        if last > first {
+            let cost = match kind {
+                Kind::Collapse => self.settings.collapse * self.largest_tolerance(),
+                _ => 0.0,
+            };
+            self.history
+                .push(Event::applied(kind, cost, DVec3::ZERO, first, last));
+        }
+    }
+
+    fn largest_tolerance(&self) -> f64 {
+        let largest = self.fine.vertex_radius.iter().zip(&self.fine.vertex_outside);
+        self.measure.tolerance.at(largest
+            .filter(|(_, outside)| !**outside)
+            .map(|(r, _)| *r)
+            .fold(0.0, f64::max))
+    }
+
+    fn burn(&mut self) {
+        self.erosion = burn(&self.complex, &self.measure);
+        self.relative = self
+            .erosion
+            .iter()
+            .zip(&self.measure.facet_radius)
+            .map(|(et, &r)| et / self.measure.tolerance.at(r))
+            .collect();
+    }
+
+    fn collapse(&mut self) {
+        let limit = self.settings.collapse;
+        let relative = &self.relative;
+        collapse_facets(
+            &mut self.complex,
+            &self.measure,
+            0..self.fine.num_facets() as u32,
+            |f| (relative[f as usize] < limit).then_some(relative[f as usize]),
+        );
+        self.fire
+            .prune(&mut self.complex, &self.measure, self.settings.wire * limit);
+    }
+
+    fn splice(&mut self, cover: &mut Cover) -> usize {
+        let splicer = Splicer {
+            measure: &self.measure,
+            relative: &self.relative,
+            limit: self.settings.splice,
+            wire: self.settings.wire,
+            count: (self.settings.cost == Cost::Count).then_some(self.settings.count_threshold),
+        };
+        splicer.run(&mut self.complex, &mut self.fire, cover, &mut self.history)
+    }
+
+    fn simplify(&mut self, cover: &mut Cover) {
+        for _ in 0..self.settings.rounds {
+            let mut changes = self.splice(cover);
+            if self.settings.cost == Cost::Length {
+                changes += trim_fins(
+                    &mut self.complex,
+                    &self.measure,
+                    &self.relative,
+                    self.settings.splice,
+                    self.settings.wire,
+                    &mut self.fire,
+                    cover,
+                    &mut self.history,
+                );
+            }
+            if changes == 0 {
+                break;
+            }
+        }
+    }
+
+    /// Growth, then the last small remnants.
+    fn grow(&mut self, cover: &Cover) {
+        let (least, least_axial) = (self.settings.grow_back, self.settings.grow_back_axial);
+        self.stage(Kind::GrowBack, |run| {
+            grow_sheets(&mut run.complex, &run.relative, least, least_axial);
+        });
+        self.stage(Kind::GrowWires, |run| {
+            grow_wires(&mut run.complex, &run.measure, &run.fire, least);
+        });
+        let mut cover = Cover::new(&self.complex, &self.measure, Some(cover.clone()));
+        self.splice(&mut cover);
+        remove_small_wires(
+            &mut self.complex,
+            &self.measure,
+            self.settings.splice,
+            &mut cover,
+            &mut self.history,
+        );
+    }
+
+    /// Grows back, and starts again with pieces restored while the surface has moved too far anywhere. Returns the
+    /// distances from the generators to the balls.
+    fn grow_within_tolerance(&mut self, cover: &Cover) -> Vec<f64> {
+        let offending = |distances: &[f64]| -> Vec<u32> {
+            (0..distances.len() as u32)
+                .filter(|&g| distances[g as usize] > cover.tolerance(g as usize))
+                .collect()
+        };
+        for attempt in 0..=ATTEMPTS {
+            let start = (self.complex.log.len(), self.history.len());
+            let fire = self.fire.clone();
+            if attempt < ATTEMPTS {
+                self.grow(cover);
+            }
+            let distances = fidelity::distances(&self.complex, cover);
+            let bad = offending(&distances);
+            if bad.is_empty() || self.settings.cost == Cost::Count {
+                return distances;
+            }
+            self.complex.undo_to(start.0);
+            self.history.truncate(start.1);
+            self.fire = fire;
+            self.stage(Kind::Restore, |run| {
+                fidelity::restore(&mut run.complex, cover, &bad);
+            });
+        }
+        self.grow(cover);
+        fidelity::distances(&self.complex, cover)
+    }
+
+    fn finish(self, seams: Vec<Vec<u32>>, fidelity: Fidelity) -> Regularised {
+        let tolerance_mm = self.largest_tolerance();
+        let wire_erosion_mm = (0..self.fine.num_vertices() as u32)
+            .map(|v| self.fire.erosion(&self.complex, v).unwrap_or(f64::NAN))
+            .collect();
+        let log = self.complex.log.clone();
+        Regularised {
+            alive: self.complex.into(),
+            erosion_mm: self.erosion,
+            wire_erosion_mm,
+            seams,
+            log,
+            history: self.history,
+            betti: self.betti,
+            fidelity,
+            tolerance_mm,
+        }
+    }
+}
