@@ -42,6 +42,50 @@ pub struct CoarseScaffold {
     pub curves: Vec<Curve>,
     /// Sheets; `sheets[i].id == SheetId(i)`.
     pub sheets: Vec<Sheet>,
+    /// Tolerances at which the graph is least a matter of the exact cut, the best first; see [`NaturalTolerance`].
+    #[serde(default)]
+    pub natural_tolerances: Vec<NaturalTolerance>,
+    /// The way back to the fine scaffold; empty in a scaffold read from a file or in a view.
+    #[serde(skip)]
+    pub fine: FineLinks,
+}
+
+/// A wide gap in the sorted persistences: any tolerance inside it gives the same graph.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NaturalTolerance {
+    /// Middle of the gap on a log scale, mm.
+    pub tolerance_mm: f64,
+    /// Upper end of the gap over its lower end.
+    pub ratio: f64,
+    /// Axial curves and wires above the gap.
+    pub curves: u32,
+}
+
+/// What hosts a generator: the element of the coarse scaffold it belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Host {
+    /// A sheet.
+    Sheet(SheetId),
+    /// A wire.
+    Curve(CurveId),
+    /// A node that is all there is (a ball).
+    Node(NodeId),
+    /// No tetrahedron of this side has the generator: it takes no part.
+    Absent,
+}
+
+/// Elements of the fine scaffold behind each element of the coarse one.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct FineLinks {
+    /// Fine vertices of each node: one, or those of a curve that was contracted to it.
+    pub node_vertices: Vec<Vec<u32>>,
+    /// Fine edges of each curve, in order along it.
+    pub curve_edges: Vec<Vec<u32>>,
+    /// Fine facets of each sheet, ascending.
+    pub sheet_facets: Vec<Vec<u32>>,
+    /// Host of each generator; total.
+    pub generator_host: Vec<Host>,
 }
 
 /// What meets at a node.

@@ -1,7 +1,22 @@
 //! Coarse scaffold: the hypergraph of nodes, curves and sheets, with attributes and persistence.
+//!
+//! In: the fine scaffold and its regularisation. Out: [`CoarseScaffold`].
+//!
+//! * [`hypergraph`]: the types that matching, measures and reports read;
+//! * [`build`]: [`coarse_scaffold`], the front function; `network` finds nodes, curves and sheets, `attributes` measures
+//!   them, `generators` maps the surface to them, `natural` finds gaps in the persistences.
 
+mod attributes;
+pub mod build;
+mod generators;
 pub mod hypergraph;
+mod natural;
+mod network;
+pub mod settings;
 
+pub use build::coarse_scaffold;
 pub use hypergraph::{
-    CoarseScaffold, Curve, CurveKind, MedialPoint, Node, NodeKind, Sheet, SheetMesh, SheetMoments,
+    CoarseScaffold, Curve, CurveKind, FineLinks, Host, MedialPoint, NaturalTolerance, Node, NodeKind, Sheet,
+    SheetMesh, SheetMoments,
 };
+pub use settings::CoarseScaffoldSettings;

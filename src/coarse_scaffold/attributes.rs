@@ -1,0 +1,208 @@
+//! Attributes of curves and sheets: lengths, areas, radii, moments, meshes, boundaries.
+
+use super::hypergraph::{Curve, CurveKind, Host, MedialPoint, Sheet, SheetMesh, SheetMoments};
+use crate::fine_scaffold::FineScaffold;
+use crate::fine_scaffold::complex::NONE;
+use crate::geometry::{CurveId, SheetId};
+use glam::DVec3;
+use nalgebra::{Matrix3, SymmetricEigen};
+
+/// Length of a polyline, mm; a closed one returns to its start.
+pub(crate) fn length(polyline: &[MedialPoint], closed: bool) -> f64 {
+    let open: f64 = polyline
+        .windows(2)
+        .map(|w| w[0].position.distance(w[1].position))
+        .sum();
+    match (closed, polyline.first(), polyline.last()) {
+        (true, Some(a), Some(b)) => open + a.position.distance(b.position),
+        _ => open,
+    }
+}
+
+/// Smooths positions and radii along a curve by a shrink-free pair of passes (Taubin, "A signal processing approach to fair
+/// surface design", 1995); the ends of an open curve stay.
+pub(crate) fn smooth(polyline: &mut [MedialPoint], closed: bool, passes: u32) {
+    const SHRINK: f64 = 0.5;
+    const GROW: f64 = -0.53;
+    let n = polyline.len();
+    if n < 3 {
+        return;
+    }
+    let mut next = polyline.to_vec();
+    for factor in std::iter::repeat_n([SHRINK, GROW], passes as usize).flatten() {
+        for i in 0..n {
+            if !closed && (i == 0 || i == n - 1) {
+                continue;
+            }
+            let (a, b, p) = (polyline[(i + n - 1) % n], polyline[(i + 1) % n], polyline[i]);
+            next[i] = MedialPoint {
+                position: p.position + factor * (0.5 * (a.position + b.position) - p.position),
+                radius: p.radius + factor * (0.5 * (a.radius + b.radius) - p.radius),
+            };
+        }
+        polyline.copy_from_slice(&next);
+    }
+}
+
+/// A sheet with everything but its boundary and shares.
+pub(crate) fn sheet(fine: &FineScaffold, index: usize, facets: &[u32], persistence: f64) -> Sheet {
+    let mesh = mesh(fine, facets);
+    let point = |i: u32| mesh.vertices[i as usize];
+    let (mut area, mut weighted_radius, mut first) = (0.0, 0.0, DVec3::ZERO);
+    let origin = mesh.vertices.first().map_or(DVec3::ZERO, |p| p.position);
+    for t in &mesh.triangles {
+        let [a, b, c] = t.map(point);
+        let s = 0.5 * (b.position - a.position).cross(c.position - a.position).length();
+        area += s;
+        weighted_radius += s * (a.radius + b.radius + c.radius) / 3.0;
+        first += s * ((a.position + b.position + c.position) / 3.0 - origin);
+    }
+    let centroid = if area > 0.0 { origin + first / area } else { origin };
+    Sheet {
+        id: SheetId::from_index(index),
+        persistence,
+        boundary: Vec::new(),
+        area,
+        mean_radius: if area > 0.0 { weighted_radius / area } else { 0.0 },
+        max_radius: mesh.vertices.iter().map(|p| p.radius).fold(0.0, f64::max),
+        volume_share: 0.0,
+        generators: 0,
+        moments: moments(&mesh, centroid, area),
+        mesh,
+    }
+}
+
+/// Exact second moments of the triangles about the centroid.
+fn moments(mesh: &SheetMesh, centroid: DVec3, area: f64) -> SheetMoments {
+    let mut m = Matrix3::<f64>::zeros();
+    for t in &mesh.triangles {
+        let [a, b, c] = t.map(|i| mesh.vertices[i as usize].position - centroid);
+        let s = 0.5 * (b - a).cross(c - a).length();
+        // The integral of x x^T over a triangle is s/12 (sum over corners of v v^T + w w^T with w the sum of corners).
+        for v in [a, b, c, a + b + c] {
+            let v: nalgebra::Vector3<f64> = v.into();
+            m += v * v.transpose() * (s / 12.0);
+        }
+    }
+    if area <= 0.0 {
+        return SheetMoments {
+            centroid,
+            axes: [DVec3::X, DVec3::Y, DVec3::Z],
+            ..SheetMoments::default()
+        };
+    }
+    let eigen = SymmetricEigen::new(m / area);
+    let mut order = [0, 1, 2];
+    order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
+    let axis = |k: usize| {
+        let c = eigen.eigenvectors.column(order[k]);
+        let v = DVec3::new(c[0], c[1], c[2]);
+        // Sign by the largest component, so that equal shapes have equal axes.
+        let largest = v.to_array().into_iter().max_by(|a, b| a.abs().total_cmp(&b.abs()));
+        if largest.is_some_and(|x| x < 0.0) { -v } else { v }
+    };
+    let (first, second) = (axis(0), axis(1));
+    SheetMoments {
+        centroid,
+        deviations: order.map(|i| eigen.eigenvalues[i].max(0.0).sqrt()),
+        axes: [first, second, first.cross(second)],
+    }
+}
+
+/// The facets as a fan of triangles each, over shared vertices.
+fn mesh(fine: &FineScaffold, facets: &[u32]) -> SheetMesh {
+    let mut used: Vec<u32> = facets
+        .iter()
+        .flat_map(|&f| fine.facet_vertices(f as usize).iter().copied())
+        .collect();
+    used.sort_unstable();
+    used.dedup();
+    let slot = |v: u32| used.partition_point(|&u| u < v) as u32;
+    let triangles = facets
+        .iter()
+        .flat_map(|&f| {
+            let ring = fine.facet_vertices(f as usize);
+            (1..ring.len() - 1).map(|k| [slot(ring[0]), slot(ring[k]), slot(ring[k + 1])])
+        })
+        .collect();
+    SheetMesh {
+        vertices: used
+            .iter()
+            .map(|&v| MedialPoint {
+                position: fine.vertex_position[v as usize],
+                radius: fine.vertex_radius[v as usize],
+            })
+            .collect(),
+        triangles,
+    }
+}
+
+/// The boundary of each sheet as chains of curves that share nodes, the longest first.
+pub(crate) fn boundaries(sheets: &mut [Sheet], curves: &[Curve]) {
+    let mut of_sheet: Vec<Vec<CurveId>> = vec![Vec::new(); sheets.len()];
+    for c in curves.iter().filter(|c| c.kind != CurveKind::Wire) {
+        for s in &c.sheets {
+            if !of_sheet[s.index()].contains(&c.id) {
+                of_sheet[s.index()].push(c.id);
+            }
+        }
+    }
+    for (sheet, own) in sheets.iter_mut().zip(of_sheet) {
+        let mut chains = walk(&own, curves);
+        let size = |chain: &[CurveId]| chain.iter().map(|c| curves[c.index()].length).sum::<f64>();
+        chains.sort_by(|a, b| size(b).total_cmp(&size(a)).then(a.cmp(b)));
+        sheet.boundary = chains;
+    }
+}
+
+/// Connected pieces of a set of curves, each walked from its smallest curve, turning into the smallest unused neighbour.
+fn walk(own: &[CurveId], curves: &[Curve]) -> Vec<Vec<CurveId>> {
+    let mut used = vec![false; own.len()];
+    let mut chains = Vec::new();
+    for i in 0..own.len() {
+        if used[i] {
+            continue;
+        }
+        used[i] = true;
+        let mut chain = vec![own[i]];
+        let mut nodes = curves[own[i].index()].nodes.clone();
+        // The last node first, so that the chain runs on from where it is.
+        while let Some((j, node)) = nodes.iter().rev().find_map(|&node| {
+            let near = (0..own.len()).find(|&j| !used[j] && curves[own[j].index()].nodes.contains(&node));
+            near.map(|j| (j, node))
+        }) {
+            used[j] = true;
+            chain.push(own[j]);
+            let ends = &curves[own[j].index()].nodes;
+            nodes.extend(ends.iter().copied().filter(|&n| n == node));
+            nodes.extend(ends.iter().copied().filter(|&n| n != node));
+        }
+        chains.push(chain);
+    }
+    chains
+}
+
+/// Generators and volume shares of the sheets by the generator map.
+pub(crate) fn shares(fine: &FineScaffold, sheets: &mut [Sheet], hosts: &[Host]) {
+    let total = fine.solid_volume_mm3();
+    for (g, host) in hosts.iter().enumerate() {
+        if let Host::Sheet(s) = host {
+            sheets[s.index()].generators += 1;
+            if total > 0.0 {
+                sheets[s.index()].volume_share += fine.generator_volume[g] / total;
+            }
+        }
+    }
+}
+
+/// Area of a facet, mm^2.
+pub(crate) fn facet_area(fine: &FineScaffold, facet: u32) -> f64 {
+    let ring = fine.facet_vertices(facet as usize);
+    debug_assert!(ring.iter().all(|&v| v != NONE));
+    let p = |k: usize| fine.vertex_position[ring[k % ring.len()] as usize];
+    let mut normal = DVec3::ZERO;
+    for k in 1..ring.len() - 1 {
+        normal += (p(k) - p(0)).cross(p(k + 1) - p(0));
+    }
+    0.5 * normal.length()
+}

@@ -1,0 +1,233 @@
+//! From the network of curves to the hypergraph with attributes.
+//!
+//! In: the fine scaffold and its regularisation. Out: [`CoarseScaffold`].
+//!
+//! 1. [`super::network`]: nodes, chains and sheets;
+//! 2. persistence: of a sheet its largest erosion thickness (ET), of an axial curve the largest third-highest ET along it, of a
+//!    wire the largest ET of its vertices, of a rib that of its sheet, of a seam that of the axial curve it goes on from.
+//!    What no fire reaches (closed sheets, wires between other elements) cannot go at any price: it gets the diagonal;
+//! 3. attributes: polylines, lengths, areas, radii, moments, meshes;
+//! 4. the generator map: the sheet that most of a generator's Voronoi facets by area belong to, else what holds the nearest ball.
+//!
+//! Cost `O(n log n)`.
+
+use super::attributes;
+use super::generators::generator_hosts;
+use super::hypergraph::{
+    CoarseScaffold, Curve, CurveKind, FineLinks, MedialPoint, Node, NodeKind, Sheet,
+};
+use super::natural::natural_tolerances;
+use super::network::{Chain, Network};
+use super::settings::CoarseScaffoldSettings;
+use crate::fine_scaffold::FineScaffold;
+use crate::fine_scaffold::complex::NONE;
+use crate::geometry::{CurveId, NodeId, SheetId};
+use crate::regularise::Regularised;
+
+/// Makes the coarse scaffold; see the module for what the attributes mean.
+///
+/// # Complexity
+/// `O(n log n)` in the size of what the regularisation left.
+pub fn coarse_scaffold(
+    fine: &FineScaffold,
+    regularised: &Regularised,
+    settings: &CoarseScaffoldSettings,
+) -> CoarseScaffold {
+    let mut network = Network::new(fine, regularised);
+    let tau = regularised.tolerance_mm;
+    network.contract(settings.contract_seam * tau, settings.contract_curve * tau);
+    let node_vertices = network.nodes();
+    let mut node_of_vertex = vec![NONE; fine.num_vertices()];
+    for (i, vertices) in node_vertices.iter().enumerate() {
+        for &v in vertices {
+            node_of_vertex[v as usize] = i as u32;
+        }
+    }
+    let chains = network.chains();
+    let sheet_facets = network.sheets();
+    let mut sheet_of_facet = vec![NONE; fine.num_facets()];
+    for (i, facets) in sheet_facets.iter().enumerate() {
+        for &f in facets {
+            sheet_of_facet[f as usize] = i as u32;
+        }
+    }
+    let never = fine.scale.diagonal_mm;
+    let sheet_persistence: Vec<f64> = sheet_facets
+        .iter()
+        .map(|facets| largest(facets.iter().map(|&f| regularised.erosion_mm[f as usize]), never))
+        .collect();
+    let mut curves: Vec<Curve> = chains
+        .iter()
+        .enumerate()
+        .map(|(i, chain)| {
+            let sheets: Vec<SheetId> = network
+                .facets(chain.edges[0])
+                .map(|f| SheetId(sheet_of_facet[f as usize]))
+                .collect();
+            let persistence = match chain.kind {
+                CurveKind::Axial => largest(chain.edges.iter().map(|&e| third(&network, e)), never),
+                CurveKind::Rib => sheet_persistence[sheets[0].index()],
+                CurveKind::Wire => wire_persistence(regularised, chain, never),
+                CurveKind::Seam => 0.0,
+            };
+            curve(fine, chain, i, sheets, persistence, &node_of_vertex, settings)
+        })
+        .collect();
+    let mut nodes = nodes(fine, &node_vertices, &curves);
+    seam_persistence(&mut curves, &nodes);
+    for node in &mut nodes {
+        node.persistence = node
+            .curves
+            .iter()
+            .map(|c| &curves[c.index()])
+            .filter(|c| matches!(c.kind, CurveKind::Axial | CurveKind::Wire))
+            .map(|c| c.persistence)
+            .fold(0.0, f64::max);
+    }
+    let mut sheets: Vec<Sheet> = sheet_facets
+        .iter()
+        .enumerate()
+        .map(|(i, facets)| attributes::sheet(fine, i, facets, sheet_persistence[i]))
+        .collect();
+    attributes::boundaries(&mut sheets, &curves);
+    let links = FineLinks {
+        node_vertices,
+        curve_edges: chains.into_iter().map(|c| c.edges).collect(),
+        sheet_facets,
+        generator_host: Vec::new(),
+    };
+    let generator_host = generator_hosts(fine, regularised, &links, &sheet_of_facet, &node_of_vertex);
+    attributes::shares(fine, &mut sheets, &generator_host);
+    CoarseScaffold {
+        tolerance_mm: tau,
+        diagonal_mm: never,
+        natural_tolerances: natural_tolerances(&curves, tau, never),
+        nodes,
+        curves,
+        sheets,
+        fine: FineLinks {
+            generator_host,
+            ..links
+        },
+    }
+}
+
+/// Largest value, capped at `never`.
+fn largest(values: impl Iterator<Item = f64>, never: f64) -> f64 {
+    values.fold(0.0, f64::max).min(never)
+}
+
+/// Third-highest erosion thickness at an axial edge (three facets at most meet there).
+fn third(network: &Network, edge: u32) -> f64 {
+    network
+        .facets(edge)
+        .map(|f| network.regularised.erosion_mm[f as usize])
+        .fold(f64::INFINITY, f64::min)
+}
+
+fn wire_persistence(regularised: &Regularised, chain: &Chain, never: f64) -> f64 {
+    // Fire comes along a wire from its tip; a wire that no fire has crossed whole holds the shape together.
+    let inner = chain
+        .vertices
+        .iter()
+        .map(|&v| regularised.wire_erosion_mm[v as usize]);
+    let unburnt = inner.clone().any(f64::is_nan);
+    if unburnt { never } else { largest(inner, never) }
+}
+
+fn seam_persistence(curves: &mut [Curve], nodes: &[Node]) {
+    for i in 0..curves.len() {
+        if curves[i].kind == CurveKind::Seam {
+            curves[i].persistence = curves[i]
+                .nodes
+                .iter()
+                .flat_map(|n| &nodes[n.index()].curves)
+                .map(|c| &curves[c.index()])
+                .filter(|c| c.kind == CurveKind::Axial)
+                .map(|c| c.persistence)
+                .fold(0.0, f64::max);
+        }
+    }
+}
+
+fn curve(
+    fine: &FineScaffold,
+    chain: &Chain,
+    index: usize,
+    sheets: Vec<SheetId>,
+    persistence: f64,
+    node_of_vertex: &[u32],
+    settings: &CoarseScaffoldSettings,
+) -> Curve {
+    let (first, last) = (chain.vertices[0], chain.vertices[chain.vertices.len() - 1]);
+    let ends: Vec<NodeId> = [first, last]
+        .iter()
+        .map(|&v| node_of_vertex[v as usize])
+        .filter(|&n| n != NONE)
+        .map(NodeId)
+        .collect();
+    let closed = ends.is_empty() || (ends.len() == 2 && ends[0] == ends[1]);
+    let mut polyline: Vec<MedialPoint> = chain
+        .vertices
+        .iter()
+        .map(|&v| MedialPoint {
+            position: fine.vertex_position[v as usize],
+            radius: fine.vertex_radius[v as usize],
+        })
+        .collect();
+    if ends.is_empty() {
+        polyline.pop();
+    }
+    attributes::smooth(&mut polyline, ends.is_empty(), settings.smoothing);
+    Curve {
+        id: CurveId::from_index(index),
+        kind: chain.kind,
+        persistence,
+        nodes: ends,
+        closed,
+        sheets,
+        length: attributes::length(&polyline, closed),
+        polyline,
+    }
+}
+
+fn nodes(fine: &FineScaffold, node_vertices: &[Vec<u32>], curves: &[Curve]) -> Vec<Node> {
+    let mut curves_at: Vec<Vec<CurveId>> = vec![Vec::new(); node_vertices.len()];
+    for c in curves {
+        for n in &c.nodes {
+            curves_at[n.index()].push(c.id);
+        }
+    }
+    node_vertices
+        .iter()
+        .zip(curves_at)
+        .enumerate()
+        .map(|(i, (vertices, at))| {
+            // A contracted node sits where the scaffold is thickest: at the end of the axial curve, not on the rib.
+            let v = vertices
+                .iter()
+                .copied()
+                .max_by(|&a, &b| {
+                    let r = |v: u32| fine.vertex_radius[v as usize];
+                    r(a).total_cmp(&r(b)).then(b.cmp(&a))
+                })
+                .unwrap_or(0) as usize;
+            let number = |kind: CurveKind| at.iter().filter(|c| curves[c.index()].kind == kind).count();
+            let (axial, rib, wire) = (number(CurveKind::Axial), number(CurveKind::Rib), number(CurveKind::Wire));
+            let kind = match (axial, rib, wire, at.len()) {
+                (4, 0, 0, 4) => NodeKind::A14,
+                (1, _, 0, _) if rib >= 1 => NodeKind::A1A3,
+                (0, 0, 1, 1) => NodeKind::Tip,
+                _ => NodeKind::Degenerate,
+            };
+            Node {
+                id: NodeId::from_index(i),
+                kind,
+                position: fine.vertex_position[v],
+                radius: fine.vertex_radius[v],
+                curves: at,
+                persistence: 0.0,
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,25 @@
+//! Settings of the coarse scaffold.
+
+use serde::{Deserialize, Serialize};
+
+/// Settings of the coarse scaffold. Factors multiply the tolerance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CoarseScaffoldSettings {
+    /// Seams up to this long are shrunk to a node, so that the axial curve ends on the rib (merge A1A5).
+    pub contract_seam: f64,
+    /// Axial curves up to this long between two nodes are shrunk to a node (transitions A1^5 and A1^2A3-I).
+    pub contract_curve: f64,
+    /// Passes of smoothing of curves for display and length; the ends stay.
+    pub smoothing: u32,
+}
+
+impl Default for CoarseScaffoldSettings {
+    fn default() -> Self {
+        Self {
+            contract_seam: 2.5,
+            contract_curve: 0.5,
+            smoothing: 10,
+        }
+    }
+}
