@@ -19,15 +19,19 @@ pub(crate) fn length(polyline: &[MedialPoint], closed: bool) -> f64 {
     }
 }
 
-/// Smooths positions and radii along a curve by a shrink-free pair of passes (Taubin, "A signal processing approach to fair
-/// surface design", 1995); the ends of an open curve stay.
-pub(crate) fn smooth(polyline: &mut [MedialPoint], closed: bool, passes: u32) {
+/// Smooths positions and radii along a curve over about `width_mm` by shrink-free pairs of passes (Taubin, "A signal processing
+/// approach to fair surface design", 1995); the ends of an open curve stay.
+pub(crate) fn smooth(polyline: &mut [MedialPoint], closed: bool, width_mm: f64) {
     const SHRINK: f64 = 0.5;
     const GROW: f64 = -0.53;
+    const MAX_PASSES: f64 = 300.0;
     let n = polyline.len();
     if n < 3 {
         return;
     }
+    // A pass averages over one step either way; k passes over the square root of k.
+    let step = length(polyline, closed) / n as f64;
+    let passes = (width_mm / step).powi(2).min(MAX_PASSES);
     let mut next = polyline.to_vec();
     for factor in std::iter::repeat_n([SHRINK, GROW], passes as usize).flatten() {
         for i in 0..n {
@@ -98,7 +102,10 @@ fn moments(mesh: &SheetMesh, centroid: DVec3, area: f64) -> SheetMoments {
         let c = eigen.eigenvectors.column(order[k]);
         let v = DVec3::new(c[0], c[1], c[2]);
         // Sign by the largest component, so that equal shapes have equal axes.
-        let largest = v.to_array().into_iter().max_by(|a, b| a.abs().total_cmp(&b.abs()));
+        let largest = v
+            .to_array()
+            .into_iter()
+            .max_by(|a, b| a.abs().total_cmp(&b.abs()));
         if largest.is_some_and(|x| x < 0.0) { -v } else { v }
     };
     let (first, second) = (axis(0), axis(1));

@@ -13,9 +13,7 @@
 
 use super::attributes;
 use super::generators::generator_hosts;
-use super::hypergraph::{
-    CoarseScaffold, Curve, CurveKind, FineLinks, MedialPoint, Node, NodeKind, Sheet,
-};
+use super::hypergraph::{CoarseScaffold, Curve, CurveKind, FineLinks, MedialPoint, Node, NodeKind, Sheet};
 use super::natural::natural_tolerances;
 use super::network::{Chain, Network};
 use super::settings::CoarseScaffoldSettings;
@@ -70,7 +68,15 @@ pub fn coarse_scaffold(
                 CurveKind::Wire => wire_persistence(regularised, chain, never),
                 CurveKind::Seam => 0.0,
             };
-            curve(fine, chain, i, sheets, persistence, &node_of_vertex, settings)
+            curve(
+                fine,
+                chain,
+                i,
+                sheets,
+                persistence,
+                &node_of_vertex,
+                settings.smoothing * tau,
+            )
         })
         .collect();
     let mut nodes = nodes(fine, &node_vertices, &curves);
@@ -105,6 +111,7 @@ pub fn coarse_scaffold(
         nodes,
         curves,
         sheets,
+        transforms: std::mem::take(&mut network.transforms),
         fine: FineLinks {
             generator_host,
             ..links
@@ -157,7 +164,7 @@ fn curve(
     sheets: Vec<SheetId>,
     persistence: f64,
     node_of_vertex: &[u32],
-    settings: &CoarseScaffoldSettings,
+    smoothing_mm: f64,
 ) -> Curve {
     let (first, last) = (chain.vertices[0], chain.vertices[chain.vertices.len() - 1]);
     let ends: Vec<NodeId> = [first, last]
@@ -178,7 +185,7 @@ fn curve(
     if ends.is_empty() {
         polyline.pop();
     }
-    attributes::smooth(&mut polyline, ends.is_empty(), settings.smoothing);
+    attributes::smooth(&mut polyline, ends.is_empty(), smoothing_mm);
     Curve {
         id: CurveId::from_index(index),
         kind: chain.kind,
@@ -213,7 +220,11 @@ fn nodes(fine: &FineScaffold, node_vertices: &[Vec<u32>], curves: &[Curve]) -> V
                 })
                 .unwrap_or(0) as usize;
             let number = |kind: CurveKind| at.iter().filter(|c| curves[c.index()].kind == kind).count();
-            let (axial, rib, wire) = (number(CurveKind::Axial), number(CurveKind::Rib), number(CurveKind::Wire));
+            let (axial, rib, wire) = (
+                number(CurveKind::Axial),
+                number(CurveKind::Rib),
+                number(CurveKind::Wire),
+            );
             let kind = match (axial, rib, wire, at.len()) {
                 (4, 0, 0, 4) => NodeKind::A14,
                 (1, _, 0, _) if rib >= 1 => NodeKind::A1A3,

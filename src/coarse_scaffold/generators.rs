@@ -70,7 +70,13 @@ fn vertex_hosts(
 ) -> Vec<Host> {
     let mut hosts: Vec<Host> = node_of_vertex
         .iter()
-        .map(|&n| if n == NONE { Host::Absent } else { Host::Node(NodeId(n)) })
+        .map(|&n| {
+            if n == NONE {
+                Host::Absent
+            } else {
+                Host::Node(NodeId(n))
+            }
+        })
         .collect();
     for (c, edges) in links.curve_edges.iter().enumerate() {
         for &e in edges {

@@ -1,6 +1,7 @@
 //! The coarse scaffold as data: what matching, measures and reports read. All lengths in mm, frame LPS.
 
 use crate::geometry::{CurveId, NodeId, SheetId};
+use crate::regularise::Event;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -45,6 +46,9 @@ pub struct CoarseScaffold {
     /// Tolerances at which the graph is least a matter of the exact cut, the best first; see [`NaturalTolerance`].
     #[serde(default)]
     pub natural_tolerances: Vec<NaturalTolerance>,
+    /// Contractions and merges of curves and nodes, done or refused; they follow the history of the regularisation.
+    #[serde(default)]
+    pub transforms: Vec<Event>,
     /// The way back to the fine scaffold; empty in a scaffold read from a file or in a view.
     #[serde(skip)]
     pub fine: FineLinks,

@@ -7,7 +7,11 @@ use super::hypergraph::{Curve, CurveKind, NaturalTolerance};
 const REPORTED: usize = 5;
 
 /// The widest gaps from the tolerance up, by the ratio of their ends, the widest first.
-pub(crate) fn natural_tolerances(curves: &[Curve], tolerance_mm: f64, never_mm: f64) -> Vec<NaturalTolerance> {
+pub(crate) fn natural_tolerances(
+    curves: &[Curve],
+    tolerance_mm: f64,
+    never_mm: f64,
+) -> Vec<NaturalTolerance> {
     let mut values: Vec<f64> = curves
         .iter()
         .filter(|c| matches!(c.kind, CurveKind::Axial | CurveKind::Wire))

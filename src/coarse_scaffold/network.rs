@@ -12,7 +12,7 @@ use super::hypergraph::CurveKind;
 use crate::fine_scaffold::FineScaffold;
 use crate::fine_scaffold::complex::NONE;
 use crate::geometry::mesh::DisjointSets;
-use crate::regularise::Regularised;
+use crate::regularise::{Event, Kind, Regularised};
 
 /// A curve as a chain of fine edges and vertices.
 #[derive(Clone, Debug)]
@@ -21,15 +21,6 @@ pub(crate) struct Chain {
     pub edges: Vec<u32>,
     /// One more than edges; first equals last when closed.
     pub vertices: Vec<u32>,
-}
-
-/// A contraction that was done or refused.
-#[derive(Clone, Debug)]
-pub(crate) struct Contraction {
-    pub kind: CurveKind,
-    pub length: f64,
-    pub vertex: u32,
-    pub applied: bool,
 }
 
 pub(crate) struct Network<'a> {
@@ -41,7 +32,8 @@ pub(crate) struct Network<'a> {
     contracted: Vec<bool>,
     clusters: DisjointSets,
     in_cluster: Vec<bool>,
-    pub contractions: Vec<Contraction>,
+    /// Contractions that were done or refused.
+    pub transforms: Vec<Event>,
 }
 
 impl<'a> Network<'a> {
@@ -64,7 +56,7 @@ impl<'a> Network<'a> {
             contracted: vec![false; fine.num_edges()],
             clusters: DisjointSets::new(fine.num_vertices()),
             in_cluster: vec![false; fine.num_vertices()],
-            contractions: Vec::new(),
+            transforms: Vec::new(),
         }
     }
 
@@ -95,7 +87,8 @@ impl<'a> Network<'a> {
         edges
             .iter()
             .map(|&e| {
-                let [a, b] = self.fine.edge_vertices[e as usize].map(|v| self.fine.vertex_position[v as usize]);
+                let [a, b] =
+                    self.fine.edge_vertices[e as usize].map(|v| self.fine.vertex_position[v as usize]);
                 a.distance(b)
             })
             .sum()
@@ -105,7 +98,7 @@ impl<'a> Network<'a> {
     pub fn contract(&mut self, seam: f64, axial: f64) {
         for path in &self.regularised.seams {
             if self.length(path) <= seam {
-                self.contract_edges(CurveKind::Seam, path);
+                self.contract_edges(Kind::Merge, path);
             }
         }
         let mut short: Vec<(f64, Chain)> = self
@@ -117,22 +110,23 @@ impl<'a> Network<'a> {
             .collect();
         short.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.edges.cmp(&b.1.edges)));
         for (_, chain) in short {
-            self.contract_edges(CurveKind::Axial, &chain.edges);
+            self.contract_edges(Kind::ContractCurve, &chain.edges);
         }
     }
 
-    fn contract_edges(&mut self, kind: CurveKind, edges: &[u32]) {
+    fn contract_edges(&mut self, kind: Kind, edges: &[u32]) {
         // A trial on a copy of the clusters touched: refused when the edges would close a loop.
         let mut trial = self.clusters.clone();
         let applied = edges.iter().all(|&e| {
             let [a, b] = self.fine.edge_vertices[e as usize];
             self.contracted[e as usize] || trial.union(a, b)
         });
-        self.contractions.push(Contraction {
-            kind,
-            length: self.length(edges),
-            vertex: self.fine.edge_vertices[edges[0] as usize][0],
-            applied,
+        let place = self.fine.vertex_position[self.fine.edge_vertices[edges[0] as usize][0] as usize];
+        let cost = self.length(edges);
+        self.transforms.push(if applied {
+            Event::applied(kind, cost, place, 0, 0)
+        } else {
+            Event::skipped(kind, cost, place)
         });
         if !applied {
             return;
@@ -153,11 +147,6 @@ impl<'a> Network<'a> {
             .filter(|&e| self.kind(e).is_some() && !self.contracted[e as usize])
     }
 
-    /// The representative of a vertex: the smallest vertex of its cluster, or itself.
-    pub fn cluster(&mut self, v: u32) -> u32 {
-        self.clusters.find(v)
-    }
-
     /// Whether a vertex is (part of) a node.
     fn is_node(&self, v: u32) -> bool {
         if self.in_cluster[v as usize] {
@@ -165,10 +154,7 @@ impl<'a> Network<'a> {
         }
         let mut kinds = self.curve_edges(v).map(|e| self.kind(e));
         match (kinds.next(), kinds.next(), kinds.next()) {
-            (None, ..) => self
-                .fine
-                .edges_of_vertex(v as usize)
-                .all(|e| !self.edge_alive(e)),
+            (None, ..) => self.fine.edges_of_vertex(v as usize).all(|e| !self.edge_alive(e)),
             (Some(a), Some(b), None) => a != b,
             _ => true,
         }

@@ -10,8 +10,8 @@ pub struct CoarseScaffoldSettings {
     pub contract_seam: f64,
     /// Axial curves up to this long between two nodes are shrunk to a node (transitions A1^5 and A1^2A3-I).
     pub contract_curve: f64,
-    /// Passes of smoothing of curves for display and length; the ends stay.
-    pub smoothing: u32,
+    /// Width over which curves are smoothed for display and length; their ends stay.
+    pub smoothing: f64,
 }
 
 impl Default for CoarseScaffoldSettings {
@@ -19,7 +19,7 @@ impl Default for CoarseScaffoldSettings {
         Self {
             contract_seam: 2.5,
             contract_curve: 0.5,
-            smoothing: 10,
+            smoothing: 2.0,
         }
     }
 }

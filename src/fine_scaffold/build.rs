@@ -19,6 +19,7 @@
 use super::complex::{FineScaffold, NONE};
 use crate::delaunay::Triangulation;
 use crate::delaunay::triangulation::INFINITE;
+use crate::geometry::circumsphere::{self, Sphere};
 use crate::geometry::mesh::{DisjointSets, bounds};
 use crate::geometry::{LengthScale, TetId, VertexId};
 use crate::segregation::Segregation;
@@ -55,7 +56,9 @@ pub enum FineScaffoldError {
     )]
     Open,
     /// Labels of another triangulation.
-    #[error("{labels} inside labels for {tets} tetrahedra; segregation and triangulation do not belong together")]
+    #[error(
+        "{labels} inside labels for {tets} tetrahedra; segregation and triangulation do not belong together"
+    )]
     Labels {
         /// Number of labels.
         labels: usize,
@@ -74,7 +77,9 @@ pub enum FineScaffoldError {
         side: Side,
     },
     /// A tetrahedron so flat that its circumcentre is not a number.
-    #[error("tetrahedron {tet} of generators {generators:?} is flat and has no circumcentre; re-sample the shape")]
+    #[error(
+        "tetrahedron {tet} of generators {generators:?} is flat and has no circumcentre; re-sample the shape"
+    )]
     Flat {
         /// The tetrahedron.
         tet: TetId,
@@ -116,9 +121,7 @@ pub fn fine_scaffold(
     }
     let of_side: Vec<bool> = triangulation
         .tets()
-        .map(|t| {
-            triangulation.is_finite(t) && segregation.is_inside(t) == (settings.side == Side::Interior)
-        })
+        .map(|t| triangulation.is_finite(t) && segregation.is_inside(t) == (settings.side == Side::Interior))
         .collect();
     let dual = Vertices::new(triangulation, &of_side);
     if dual.tets.is_empty() {
@@ -135,7 +138,7 @@ pub fn fine_scaffold(
     let (generator_region, num_regions) = regions(triangulation, &of_side);
     let outside = (0..dual.tets.len())
         .into_par_iter()
-        .map(|v| !circumcentre_is_of_side(triangulation, &of_side, dual.tets[v], balls[v].0))
+        .map(|v| !circumcentre_is_of_side(triangulation, &of_side, dual.tets[v], balls[v].centre))
         .collect();
     Ok(FineScaffold {
         scale: scale(triangulation, &of_side),
@@ -143,8 +146,8 @@ pub fn fine_scaffold(
         generator_volume: generator_volumes(triangulation, &dual.tets),
         generator_region,
         num_regions,
-        vertex_position: balls.iter().map(|b| b.0).collect(),
-        vertex_radius: balls.iter().map(|b| b.1).collect(),
+        vertex_position: balls.iter().map(|b| b.centre).collect(),
+        vertex_radius: balls.iter().map(|b| b.radius).collect(),
         vertex_outside: outside,
         vertex_edges: edges.of_vertex,
         vertex_tet: dual.tets,
@@ -180,30 +183,18 @@ impl Vertices {
     }
 }
 
-fn circumballs(
-    triangulation: &Triangulation,
-    tets: &[TetId],
-) -> Result<Vec<(DVec3, f64)>, FineScaffoldError> {
-    let balls: Vec<(DVec3, f64)> = tets
+fn circumballs(triangulation: &Triangulation, tets: &[TetId]) -> Result<Vec<Sphere>, FineScaffoldError> {
+    let balls: Vec<Sphere> = tets
         .par_iter()
-        .map(|&t| circumball(triangulation.corners(t)))
+        .map(|&t| circumsphere::tetrahedron(triangulation.corners(t)))
         .collect();
-    match balls.iter().position(|b| !b.1.is_finite()) {
+    match balls.iter().position(|b| !b.radius.is_finite()) {
         None => Ok(balls),
         Some(v) => Err(FineScaffoldError::Flat {
             tet: tets[v],
             generators: triangulation.tet(tets[v]),
         }),
     }
-}
-
-/// Circumcentre and circumradius, measured from the first corner so that shapes far from the origin keep their digits.
-fn circumball([a, b, c, d]: [DVec3; 4]) -> (DVec3, f64) {
-    let (u, v, w) = (b - a, c - a, d - a);
-    let (vw, wu, uv) = (v.cross(w), w.cross(u), u.cross(v));
-    let offset =
-        (u.length_squared() * vw + v.length_squared() * wu + w.length_squared() * uv) / (2.0 * u.dot(vw));
-    (a + offset, offset.length())
 }
 
 struct Edges {
@@ -349,7 +340,11 @@ fn cells(triangulation: &Triangulation, of_side: &[bool], facet_generators: &[[V
     let n = triangulation.points.len();
     let (mut in_side, mut off_side) = (vec![false; n], vec![false; n]);
     for t in triangulation.tets() {
-        let seen = if of_side[t.index()] { &mut in_side } else { &mut off_side };
+        let seen = if of_side[t.index()] {
+            &mut in_side
+        } else {
+            &mut off_side
+        };
         for v in triangulation.tet(t) {
             if v != INFINITE {
                 seen[v.index()] = true;

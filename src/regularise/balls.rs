@@ -57,7 +57,12 @@ impl BallTree {
 
     /// The ball of least `|p - c| - r` among those `alive`, ties to the smaller id. With `enough`, the first one found within
     /// that distance will do.
-    pub fn nearest(&self, point: DVec3, enough: Option<f64>, alive: impl Fn(u32) -> bool) -> Option<NearestBall> {
+    pub fn nearest(
+        &self,
+        point: DVec3,
+        enough: Option<f64>,
+        alive: impl Fn(u32) -> bool,
+    ) -> Option<NearestBall> {
         let mut best: Option<NearestBall> = None;
         let mut stack: Vec<(f64, u32)> = Vec::with_capacity(64);
         if !self.nodes.is_empty() {
@@ -103,7 +108,14 @@ impl BallTree {
     }
 }
 
-fn build(nodes: &mut Vec<Node>, ids: &mut [u32], start: usize, end: usize, centre: &[DVec3], radius: &[f64]) -> u32 {
+fn build(
+    nodes: &mut Vec<Node>,
+    ids: &mut [u32],
+    start: usize,
+    end: usize,
+    centre: &[DVec3],
+    radius: &[f64],
+) -> u32 {
     let own = &mut ids[start..end];
     let mut lo = DVec3::INFINITY;
     let mut hi = DVec3::NEG_INFINITY;

@@ -43,7 +43,9 @@ pub(crate) fn remove_cells(complex: &mut Complex) {
         if !complex.facet_alive[f as usize] {
             continue;
         }
-        let Some(cell) = only_cell(complex, f) else { continue };
+        let Some(cell) = only_cell(complex, f) else {
+            continue;
+        };
         complex.remove_cell(cell, f);
         for &g in fine.facets_of_cell(cell as usize) {
             if complex.facet_alive[g as usize] && only_cell(complex, g).is_some() {

@@ -83,7 +83,11 @@ impl WireFire {
         let run = fine.vertex_position[source as usize].distance(fine.vertex_position[to as usize]);
         let arrival = self.time[source as usize] + run;
         let radius = fine.signed_radius(to as usize);
-        let (arrival, source) = if arrival < radius { (radius, to) } else { (arrival, source) };
+        let (arrival, source) = if arrival < radius {
+            (radius, to)
+        } else {
+            (arrival, source)
+        };
         let known = self.time[to as usize];
         if known.is_nan() || known < arrival {
             self.time[to as usize] = arrival;
@@ -114,7 +118,9 @@ impl WireFire {
         }
         let mut removed = 0;
         while let Some((key, v)) = queue.pop() {
-            let Some(edge) = complex.wire_at_tip(v) else { continue };
+            let Some(edge) = complex.wire_at_tip(v) else {
+                continue;
+            };
             let limit = factor * measure.tolerance.at(complex.fine.vertex_radius[v as usize]);
             if key >= limit {
                 continue;

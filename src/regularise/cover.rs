@@ -44,7 +44,13 @@ impl Cover {
         let tolerance = known.map_or_else(
             || {
                 (0..n)
-                    .map(|g| if best[g] == NONE { f64::INFINITY } else { measure.tolerance.at(fine.vertex_radius[best[g] as usize]) })
+                    .map(|g| {
+                        if best[g] == NONE {
+                            f64::INFINITY
+                        } else {
+                            measure.tolerance.at(fine.vertex_radius[best[g] as usize])
+                        }
+                    })
                     .collect()
             },
             |cover| cover.tolerance,
@@ -79,14 +85,18 @@ impl Cover {
         let fine = complex.fine;
         let mut out = Move::default();
         for step in &complex.log[since..] {
-            let &Step::RemoveEdge { vertex, .. } = step else { continue };
+            let &Step::RemoveEdge { vertex, .. } = step else {
+                continue;
+            };
             let mut g = self.first[vertex as usize];
             while g != NONE {
                 let tau = self.tolerance[g as usize];
                 let enough = (!exact).then_some(tau);
-                let found = self.tree.nearest(fine.generator_position[g as usize], enough, |v| {
-                    complex.vertex_alive[v as usize]
-                });
+                let found = self
+                    .tree
+                    .nearest(fine.generator_position[g as usize], enough, |v| {
+                        complex.vertex_alive[v as usize]
+                    });
                 let (id, distance) = found.map_or((NONE, f64::INFINITY), |b| (b.id, b.distance));
                 out.worst = out.worst.max(distance / tau);
                 if id != NONE {

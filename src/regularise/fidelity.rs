@@ -147,7 +147,8 @@ pub(crate) fn restore(complex: &mut Complex, cover: &Cover, generators: &[u32]) 
     for &g in generators {
         let point = fine.generator_position[g as usize];
         let tau = cover.tolerance(g as usize);
-        let covered = |v: u32| point.distance(fine.vertex_position[v as usize]) - fine.vertex_radius[v as usize] <= tau;
+        let covered =
+            |v: u32| point.distance(fine.vertex_position[v as usize]) - fine.vertex_radius[v as usize] <= tau;
         // An earlier restoration may have covered it.
         let already = complex.log[before..]
             .iter()

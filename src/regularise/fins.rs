@@ -129,13 +129,21 @@ pub(crate) fn trim_fins(
         let radius = measure.edge_radius[chain.edges[0] as usize];
         let cost = chain.persistence * measure.tolerance.at(radius);
         let movement = cover.movement(complex, since, false);
-        if movement.worst > limit || still_axial(complex) && complex.log.len() - since > 4 * chain.edges.len() + 64 {
+        if movement.worst > limit
+            || still_axial(complex) && complex.log.len() - since > 4 * chain.edges.len() + 64
+        {
             complex.undo_to(since);
             history.push(Event::skipped(Kind::TrimFin, cost, place));
             continue;
         }
         cover.accept(complex, since, movement);
-        history.push(Event::applied(Kind::TrimFin, cost, place, since, complex.log.len()));
+        history.push(Event::applied(
+            Kind::TrimFin,
+            cost,
+            place,
+            since,
+            complex.log.len(),
+        ));
         trimmed += 1;
     }
     trimmed
@@ -175,19 +183,34 @@ impl Flood {
     }
 
     /// Distance from the chain to the first facet with a rib; infinite when there is none.
-    fn first_rib(&mut self, complex: &Complex, measure: &Measure, relative: &[f64], limit: f64, chain: &[u32]) -> f64 {
+    fn first_rib(
+        &mut self,
+        complex: &Complex,
+        measure: &Measure,
+        relative: &[f64],
+        limit: f64,
+        chain: &[u32],
+    ) -> f64 {
         let mut found = f64::INFINITY;
-        self.run(complex, measure, relative, limit, chain, f64::INFINITY, |f, distance| {
-            if complex
-                .fine
-                .facet_edges(f as usize)
-                .iter()
-                .any(|&e| complex.is_rib(e))
-            {
-                found = distance;
-            }
-            !found.is_finite()
-        });
+        self.run(
+            complex,
+            measure,
+            relative,
+            limit,
+            chain,
+            f64::INFINITY,
+            |f, distance| {
+                if complex
+                    .fine
+                    .facet_edges(f as usize)
+                    .iter()
+                    .any(|&e| complex.is_rib(e))
+                {
+                    found = distance;
+                }
+                !found.is_finite()
+            },
+        );
         found
     }
 
@@ -227,7 +250,10 @@ impl Flood {
             }
             let (f, value) = lowest(complex, relative, e);
             if value < limit {
-                queue.push(measure.facet_centre[f as usize].distance(measure.edge_middle[e as usize]), f);
+                queue.push(
+                    measure.facet_centre[f as usize].distance(measure.edge_middle[e as usize]),
+                    f,
+                );
             }
         }
         while let Some((distance, f)) = queue.pop() {

@@ -21,11 +21,7 @@ pub(crate) fn grow_sheets(complex: &mut Complex, relative: &[f64], least: f64, l
         }
     };
     for f in 0..fine.num_facets() as u32 {
-        if !complex.facet_alive[f as usize]
-            && fine
-                .facet_edges(f as usize)
-                .iter()
-                .any(|&e| complex.is_rib(e))
+        if !complex.facet_alive[f as usize] && fine.facet_edges(f as usize).iter().any(|&e| complex.is_rib(e))
         {
             offer(&mut queue, f);
         }
@@ -138,7 +134,11 @@ pub(crate) fn grow_wires(complex: &mut Complex, measure: &Measure, fire: &WireFi
     let mut added = 0;
     while let Some((_, e)) = queue.pop() {
         let [a, b] = fine.edge_vertices[e as usize];
-        let (tip, v) = if complex.vertex_alive[a as usize] { (a, b) } else { (b, a) };
+        let (tip, v) = if complex.vertex_alive[a as usize] {
+            (a, b)
+        } else {
+            (b, a)
+        };
         if complex.vertex_alive[v as usize] || complex.wire_at_tip(tip).is_none() {
             continue;
         }

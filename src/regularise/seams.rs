@@ -93,7 +93,8 @@ fn seam_from(complex: &Complex, is_seam: &[bool], start: u32, longest: f64) -> O
                 continue;
             }
             let next = fine.other_end(e as usize, v);
-            let far = distance + fine.vertex_position[v as usize].distance(fine.vertex_position[next as usize]);
+            let far =
+                distance + fine.vertex_position[v as usize].distance(fine.vertex_position[next as usize]);
             if far <= longest && best.get(&next).is_none_or(|&known| far < known) {
                 best.insert(next, far);
                 reached.insert(next, e);

@@ -120,7 +120,11 @@ impl Splicer<'_> {
             let movement = cover.movement(complex, since, false);
             if self.count.is_none() && movement.worst > self.limit {
                 complex.undo_to(since);
-                history.push(Event::skipped(Kind::Splice, self.mm(&facets, cost), self.place(&facets)));
+                history.push(Event::skipped(
+                    Kind::Splice,
+                    self.mm(&facets, cost),
+                    self.place(&facets),
+                ));
                 continue;
             }
             cover.accept(complex, since, movement);
@@ -135,7 +139,9 @@ impl Splicer<'_> {
             sheets.facets[root as usize].clear();
             let mut touched: Vec<u32> = Vec::new();
             for step in &complex.log[since..] {
-                let &Step::RemoveFacet { facet, .. } = step else { continue };
+                let &Step::RemoveFacet { facet, .. } = step else {
+                    continue;
+                };
                 for &e in complex.fine.facet_edges(facet as usize) {
                     if !complex.edge_alive[e as usize] || complex.edge_count[e as usize] == 0 {
                         continue;
@@ -167,13 +173,7 @@ impl Splicer<'_> {
     }
 
     /// Cost of a sheet in tolerances, when it may go at all.
-    fn cost(
-        &self,
-        complex: &mut Complex,
-        fire: &mut WireFire,
-        cover: &Cover,
-        facets: &[u32],
-    ) -> Option<f64> {
+    fn cost(&self, complex: &mut Complex, fire: &mut WireFire, cover: &Cover, facets: &[u32]) -> Option<f64> {
         let fine = complex.fine;
         let free = facets
             .iter()

@@ -68,7 +68,10 @@ const ATTEMPTS: usize = 4;
 ///
 /// # Complexity
 /// `O(n log n)` in the size of the fine scaffold.
-pub fn regularise(fine: &FineScaffold, settings: &RegulariseSettings) -> Result<Regularised, RegulariseError> {
+pub fn regularise(
+    fine: &FineScaffold,
+    settings: &RegulariseSettings,
+) -> Result<Regularised, RegulariseError> {
     settings.check()?;
     let mut run = Run::new(fine, settings);
     run.checked("fine scaffold")?;
