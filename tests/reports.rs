@@ -79,6 +79,7 @@ fn scaffold() -> CoarseScaffold {
             ),
         ],
         sheets: vec![sheet(0, [a, d, c, b]), sheet(1, [a, b, e, f])],
+        ..CoarseScaffold::default()
     }
 }
 
