@@ -41,3 +41,5 @@ pub mod regularise;
 pub mod coarse_scaffold;
 
 pub mod reports;
+
+pub mod registration;

@@ -1,0 +1,42 @@
+//! Registration: the pose of one shape on another, verified on their surfaces.
+//!
+//! In: two [`RegistrationShape`]s in any pose (surface mesh or cloud, optionally the coarse scaffold). Out: a
+//! [`Registration`]: `T_target_source`, how well it fits, what else it could be, which motions are loose.
+//!
+//! 1. [`oriented`](self): both surfaces become oriented samples; raw clouds are de-noised.
+//! 2. Whole shapes: first guesses from moments and scaffolds, refined on the surfaces, symmetric distance decides.
+//! 3. Partial shapes, when the surfaces ask for it: poses from oriented point pairs, free space decides.
+//! 4. Ambiguity, conditioning and overlap of the chosen pose.
+//!
+//! | file | idea |
+//! |---|---|
+//! | `shape`, `settings`, `result` | what goes in and what comes out |
+//! | `oriented`, `denoise`, `cells`, `nearest_grid`, `exact` | a surface prepared for search |
+//! | `surface`, `starts` | whole shapes |
+//! | `partial`, `pairs` | partial shapes |
+//! | `score`, `refine`, `solve` | shared by both: free space, closest points, one linear step |
+//! | `verdict` | which pose is reported and what is said of it |
+//!
+//! Everything is seeded; parallel parts keep their order, so results are equal for any number of threads.
+
+mod cells;
+mod denoise;
+mod exact;
+mod nearest_grid;
+mod oriented;
+mod pairs;
+mod partial;
+mod refine;
+mod result;
+mod score;
+mod settings;
+mod shape;
+mod solve;
+mod starts;
+mod surface;
+mod verdict;
+
+pub use result::{Conditioning, Hypothesis, Method, Registration, SlidingDirection};
+pub use settings::{Extent, Mirror, RegistrationSettings};
+pub use shape::{RegistrationError, RegistrationShape, Surface};
+pub use verdict::register;

@@ -1,0 +1,135 @@
+//! Iterative closest points, symmetric and robust.
+//!
+//! In: two views, a pose, tolerances from wide to narrow. Out: a better pose. Both directions enter one system: each point
+//! and its nearest point on the other view give a row along the mean of the two normals (Rusinkiewicz 2019), weighted by
+//! Tukey's biweight of its length; pairs over the tolerance, with normals over 53 degrees apart, or beside the other
+//! view's border are dropped (Chetverikov et al. 2002 trim by rank instead; a length is steadier when the overlap is unknown).
+//!
+//! Two kinds of nearest point: the table of the view (coarse stages) or the kd-tree (the last steps). Cost: `O(points)` an
+//! iteration. Degenerate: no pair left returns the pose as it was.
+
+use super::oriented::View;
+use super::solve::{NormalEquations, cleaned};
+use crate::geometry::Rigid;
+use glam::DVec3;
+
+/// One run of the refinement; lengths in units.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Level {
+    pub(crate) iterations: usize,
+    /// Tolerance of the first and the last iteration; geometric between.
+    pub(crate) from: f64,
+    pub(crate) to: f64,
+    /// Points of each view that take part.
+    pub(crate) count: usize,
+    /// Nearest points from the kd-tree instead of the table.
+    pub(crate) exact: bool,
+    /// Least cosine between the normals of a pair.
+    pub(crate) cosine: f64,
+}
+
+/// Longest rotation of one iteration, rad.
+const LONGEST_TURN: f64 = 0.3;
+/// A partner at the border counts only when it is this close along the surface, in units.
+const BORDER_REACH: f64 = 0.03;
+
+/// Runs one level from `pose`; the result is again source to target.
+pub(crate) fn refine(source: &View, target: &View, pose: Rigid, level: Level, scale: bool) -> Rigid {
+    let mut pose = pose;
+    let ratio = if level.iterations > 1 {
+        (level.to / level.from).powf(1.0 / (level.iterations - 1) as f64)
+    } else {
+        1.0
+    };
+    let mut tolerance = level.from;
+    for _ in 0..level.iterations {
+        let rows = equations(source, target, &pose, level, tolerance);
+        let Some(step) = rows.solve(scale, 0.0, LONGEST_TURN) else {
+            return pose;
+        };
+        pose = cleaned(step.motion.after(&pose), scale);
+        tolerance *= ratio;
+        if step.size < 1e-7 {
+            break;
+        }
+    }
+    pose
+}
+
+/// The rows of all accepted pairs at a pose.
+pub(crate) fn equations(
+    source: &View,
+    target: &View,
+    pose: &Rigid,
+    level: Level,
+    tolerance: f64,
+) -> NormalEquations {
+    let mut rows = NormalEquations::new(DVec3::ZERO);
+    let back = pose.inverse();
+    let turn = pose.linear;
+    for i in 0..level.count.min(source.points.len()) {
+        let q = pose.apply(source.points[i]);
+        if let Some(j) = partner(target, q, level.exact) {
+            let (n, m) = (turn * source.normals[i], target.normals[j]);
+            add(
+                &mut rows,
+                q,
+                target.points[j],
+                n,
+                m,
+                m,
+                target.border[j],
+                level,
+                tolerance,
+            );
+        }
+    }
+    for j in 0..level.count.min(target.points.len()) {
+        let x = target.points[j];
+        if let Some(i) = partner(source, back.apply(x), level.exact) {
+            let q = pose.apply(source.points[i]);
+            let (n, m) = (turn * source.normals[i], target.normals[j]);
+            add(&mut rows, q, x, n, m, n, source.border[i], level, tolerance);
+        }
+    }
+    rows
+}
+
+#[inline]
+fn partner(view: &View, q: DVec3, exact: bool) -> Option<usize> {
+    let rough = view.grid.nearest(q)?;
+    Some(if exact { view.tree.nearest(q) } else { rough })
+}
+
+/// Adds the pair of a moved source place `q` and a target place `x` with normals `n` and `m`; `partner` is the normal at the
+/// nearest point that was found.
+#[inline]
+fn add(
+    rows: &mut NormalEquations,
+    q: DVec3,
+    x: DVec3,
+    n: DVec3,
+    m: DVec3,
+    partner: DVec3,
+    at_border: bool,
+    level: Level,
+    tolerance: f64,
+) {
+    let e = q - x;
+    let d2 = e.length_squared();
+    if d2 > tolerance * tolerance || n.dot(m) < level.cosine {
+        return;
+    }
+    if at_border {
+        let height = e.dot(partner);
+        if d2 - height * height > BORDER_REACH * BORDER_REACH {
+            return;
+        }
+    }
+    let Some(direction) = (n + m).try_normalize() else {
+        return;
+    };
+    let r = direction.dot(e);
+    let w = 1.0 - (r / tolerance).powi(2);
+    rows.add(q, direction, r, (w * w).max(0.0));
+}

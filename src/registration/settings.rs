@@ -1,0 +1,142 @@
+//! Settings of registration.
+
+use super::shape::RegistrationError;
+use serde::{Deserialize, Serialize};
+
+/// Whether the source may be mirrored (a left bone on a right one).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mirror {
+    /// Try both and let the surfaces decide.
+    Auto,
+    /// Always mirror.
+    Yes,
+    /// Never mirror.
+    #[default]
+    No,
+}
+
+/// How much of the shapes is taken to be shared.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Extent {
+    /// Try whole shapes first, partial ones when the surfaces ask for it.
+    #[default]
+    Auto,
+    /// Both are whole.
+    Whole,
+    /// One or both may be cut.
+    Partial,
+}
+
+/// Settings of [`register`](super::register). Lengths are shares of the larger shape's diagonal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RegistrationSettings {
+    /// Whether the source may be mirrored.
+    pub mirror: Mirror,
+    /// Whole shapes, partial ones, or find out.
+    pub extent: Extent,
+    /// Estimate a similarity (one scale factor) instead of a rigid motion. Whole shapes only.
+    pub scale: bool,
+    /// Points a surface is represented by while searching. 4 000 reach the accuracy measured on bones of any density.
+    pub samples: usize,
+    /// Poses tried for partial shapes. 10 000 found 50 of 50 half-overlapping carpals at 1 % noise, 3 000 48 of 48, 1 000
+    /// 46 of 48.
+    pub poses: usize,
+    /// Poses tried when the first round is weak or ambiguous; no second round when not above `poses`.
+    pub escalated_poses: usize,
+    /// A partial pose whose free-space score is below this is ambiguous. 0.3: 20 % overlap still reaches 0.43.
+    pub weak_score: f64,
+    /// A partial pose is ambiguous when the best score of a pose over 15 degrees away exceeds this share of its own.
+    pub rival_share: f64,
+    /// A whole pose is ambiguous when a pose over 15 degrees away has a residual below this multiple of its own.
+    /// Easy bones have 5.5 to 7.6, the disc-like patella 1.08.
+    pub rival_residual: f64,
+    /// Poses kept in [`Registration::hypotheses`](super::Registration::hypotheses).
+    pub hypotheses: usize,
+    /// A direction slides when its stiffness is below this share of the stiffest one.
+    pub sliding_share: f64,
+    /// Seed of every random choice.
+    pub seed: u64,
+}
+
+impl Default for RegistrationSettings {
+    fn default() -> Self {
+        Self {
+            mirror: Mirror::No,
+            extent: Extent::Auto,
+            scale: false,
+            samples: 4000,
+            poses: 10_000,
+            escalated_poses: 100_000,
+            weak_score: 0.3,
+            rival_share: 0.7,
+            rival_residual: 1.3,
+            hypotheses: 6,
+            sliding_share: 0.002,
+            seed: 0,
+        }
+    }
+}
+
+impl RegistrationSettings {
+    pub(crate) fn validate(&self) -> Result<(), RegistrationError> {
+        let check = |name, value: f64, good: bool, allowed| {
+            if good {
+                Ok(())
+            } else {
+                Err(RegistrationError::Setting { name, value, allowed })
+            }
+        };
+        check(
+            "samples",
+            self.samples as f64,
+            (100..=200_000).contains(&self.samples),
+            "100 to 200000",
+        )?;
+        check(
+            "poses",
+            self.poses as f64,
+            (1..=10_000_000).contains(&self.poses),
+            "1 to 10000000",
+        )?;
+        let many = self.escalated_poses;
+        check(
+            "escalated_poses",
+            many as f64,
+            many <= 10_000_000,
+            "at most 10000000",
+        )?;
+        check(
+            "hypotheses",
+            self.hypotheses as f64,
+            self.hypotheses > 0,
+            "at least 1",
+        )?;
+        check(
+            "weak_score",
+            self.weak_score,
+            self.weak_score.is_finite(),
+            "a number",
+        )?;
+        check(
+            "rival_share",
+            self.rival_share,
+            (0.0..=1.0).contains(&self.rival_share),
+            "0 to 1",
+        )?;
+        check(
+            "rival_residual",
+            self.rival_residual,
+            self.rival_residual >= 1.0,
+            "at least 1",
+        )?;
+        check(
+            "sliding_share",
+            self.sliding_share,
+            (0.0..1.0).contains(&self.sliding_share),
+            "0 to 1",
+        )
+    }
+}

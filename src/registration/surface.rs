@@ -1,0 +1,329 @@
+//! Whole shapes from any pose.
+//!
+//! In: two views, extra first guesses (from the scaffolds). Out: verified poses, best first.
+//!
+//! 1. First guesses: moments with flips, swaps and spins ([`super::starts`]), the scaffolds' own, each handedness allowed.
+//! 2. Every guess: 12 iterations on 150 points of each surface, nearest points from the table, tolerance from half the diagonal
+//!    to 15 %. Ranked by symmetric root mean square distance, within 8 degrees of a better one dropped, 8 kept.
+//! 3. Again with 500 points to 10 %, 4 kept.
+//! 4. The exact finish: nearest places on the surfaces themselves, untruncated, until the step vanishes. Untruncated, because two
+//!    persons' bones that differ in size fit best as wholes: a narrow tolerance locks on to one matching patch.
+//! 5. When most of the surface agrees closely once the rest is down-weighted (the median distance falls to less than half), the
+//!    robust fit wins: a fragment, a tumour or a lesion must not drag the healthy surface along.
+//!
+//! The symmetric distance decides. Papers: Besl and McKay 1992, Chen and Medioni 1992; Pottmann et al. 2006 for why the normal
+//! part of a distance is its Gauss-Newton model. Cost: some 0.2 s for bones of 20 000 points.
+
+use super::oriented::View;
+use super::refine::{Level, refine};
+use super::solve::{NormalEquations, cleaned};
+use super::starts;
+use crate::geometry::Rigid;
+use rayon::prelude::*;
+
+/// Poses nearer than this are one pose, degrees.
+pub(crate) const SAME_POSE_DEG: f64 = 8.0;
+/// Samples of each surface in the exact finish.
+const FINISH_SAMPLES: usize = 2500;
+/// Most iterations of the exact finish.
+const FINISH_ITERATIONS: usize = 60;
+
+/// A pose of whole shapes with its residuals, in units.
+#[derive(Clone, Debug)]
+pub(crate) struct WholeFit {
+    pub(crate) pose: Rigid,
+    /// Symmetric root mean square distance.
+    pub(crate) rms: f64,
+    /// The last step was below 0.1 % of the spacing.
+    pub(crate) converged: bool,
+}
+
+/// Distances of both surfaces under a pose, in units: source samples to the target, then target samples to the source.
+pub(crate) struct Distances {
+    pub(crate) there: Vec<f64>,
+    pub(crate) back: Vec<f64>,
+}
+
+impl Distances {
+    /// Exact distances of up to `count` samples of each view.
+    pub(crate) fn new(source: &View, target: &View, pose: &Rigid, count: usize) -> Self {
+        let inverse = pose.inverse();
+        // Both are measured in the target's frame, so that a similarity cannot win by shrinking the source to a point.
+        let scale = pose.linear.determinant().abs().cbrt();
+        let there = source.points[..count.min(source.points.len())]
+            .par_iter()
+            .map(|&p| {
+                let q = pose.apply(p);
+                target.exact.touch(q).place.distance(q)
+            })
+            .collect();
+        let back = target.points[..count.min(target.points.len())]
+            .par_iter()
+            .map(|&p| {
+                let q = inverse.apply(p);
+                source.exact.touch(q).place.distance(q) * scale
+            })
+            .collect();
+        Self { there, back }
+    }
+
+    /// Root of the mean over directions of the mean squares.
+    pub(crate) fn rms(&self) -> f64 {
+        let mean = |d: &[f64]| d.iter().map(|x| x * x).sum::<f64>() / d.len().max(1) as f64;
+        (0.5 * (mean(&self.there) + mean(&self.back))).sqrt()
+    }
+
+    /// The value below which `share` of all distances lie.
+    pub(crate) fn quantile(&self, share: f64) -> f64 {
+        let mut all: Vec<f64> = self.there.iter().chain(&self.back).copied().collect();
+        if all.is_empty() {
+            return 0.0;
+        }
+        let k = ((all.len() - 1) as f64 * share).round() as usize;
+        *all.select_nth_unstable_by(k, f64::total_cmp).1
+    }
+}
+
+/// Finds the poses of two whole shapes, the best first; rivals are over [`SAME_POSE_DEG`] apart. `guesses` are extra first
+/// guesses in view coordinates.
+pub(crate) fn whole(
+    source: &View,
+    target: &View,
+    guesses: &[Rigid],
+    scale: bool,
+    keep: usize,
+) -> Vec<WholeFit> {
+    let mut poses = guesses.to_vec();
+    poses.extend(starts::from_moments(&target.moments, &source.moments));
+    let rough = Level {
+        iterations: 12,
+        from: 0.5,
+        to: 0.15,
+        count: 150,
+        exact: false,
+        cosine: 0.0,
+    };
+    let poses = search(source, target, poses, rough, 8);
+    let fine = Level {
+        iterations: 12,
+        from: 0.25,
+        to: 0.10,
+        count: 500,
+        exact: false,
+        cosine: 0.3,
+    };
+    let poses = search(source, target, poses, fine, keep.max(2));
+    let mut fits: Vec<WholeFit> = poses
+        .into_iter()
+        .map(|pose| settle(source, target, pose, 500, 12, scale))
+        .collect();
+    rank(&mut fits);
+    // Only the winner and its nearest rival are worth the whole surface.
+    for fit in fits.iter_mut().take(2) {
+        *fit = settle(source, target, fit.pose, FINISH_SAMPLES, FINISH_ITERATIONS, scale);
+    }
+    rank(&mut fits);
+    if let Some(best) = fits.first_mut()
+        && let Some(robust) = robust_finish(source, target, best.pose, scale)
+    {
+        *best = robust;
+    }
+    fits
+}
+
+fn search(source: &View, target: &View, poses: Vec<Rigid>, level: Level, keep: usize) -> Vec<Rigid> {
+    let mut fits: Vec<WholeFit> = poses
+        .into_par_iter()
+        .map(|pose| {
+            let pose = refine(source, target, pose, level, false);
+            WholeFit {
+                pose,
+                rms: table_rms(source, target, &pose, 300),
+                converged: false,
+            }
+        })
+        .collect();
+    rank(&mut fits);
+    fits.truncate(keep);
+    fits.into_iter().map(|f| f.pose).collect()
+}
+
+/// Sorts by residual (stable, so equal poses keep the order of their guesses) and drops poses near a better one.
+fn rank(fits: &mut Vec<WholeFit>) {
+    fits.sort_by(|a, b| a.rms.total_cmp(&b.rms));
+    let mut kept: Vec<WholeFit> = Vec::with_capacity(fits.len());
+    for fit in fits.drain(..) {
+        if kept
+            .iter()
+            .all(|k| k.pose.rotation_angle_deg(&fit.pose) > SAME_POSE_DEG)
+        {
+            kept.push(fit);
+        }
+    }
+    *fits = kept;
+}
+
+/// Symmetric root mean square distance with nearest points from the tables; places outside a table count as its margin.
+fn table_rms(source: &View, target: &View, pose: &Rigid, count: usize) -> f64 {
+    let one = |moving: &View, fixed: &View, pose: &Rigid| {
+        let n = count.min(moving.points.len());
+        let sum: f64 = moving.points[..n]
+            .iter()
+            .map(|&p| {
+                let q = pose.apply(p);
+                fixed
+                    .grid
+                    .nearest(q)
+                    .map_or(0.0625, |j| fixed.points[j].distance_squared(q))
+            })
+            .sum();
+        sum / n as f64
+    };
+    (0.5 * (one(source, target, pose) + one(target, source, &pose.inverse()))).sqrt()
+}
+
+/// The untruncated exact fit from a near pose; the best pose on the way by symmetric distance.
+fn settle(
+    source: &View,
+    target: &View,
+    start: Rigid,
+    samples: usize,
+    iterations: usize,
+    scale: bool,
+) -> WholeFit {
+    let spacing = source.spacing.min(target.spacing);
+    let mut pose = start;
+    let mut best = WholeFit {
+        pose,
+        rms: f64::INFINITY,
+        converged: false,
+    };
+    let mut worse = 0;
+    for _ in 0..iterations {
+        let ExactRows { rows, rms, .. } = exact_rows(source, target, &pose, samples, None);
+        if rms < best.rms {
+            best.rms = rms;
+            best.pose = pose;
+            worse = 0;
+        } else {
+            worse += 1;
+        }
+        let Some(step) = rows.solve(scale, 0.0, 0.2) else {
+            break;
+        };
+        // Two surfaces that fit exactly converge quadratically to rounding; others crawl, and a thousandth of the spacing is far
+        // below what their samples resolve.
+        if step.size < 1e-12 || worse > 4 {
+            best.converged = true;
+            break;
+        }
+        best.converged = step.size < 1e-3 * spacing;
+        if best.converged && rms > 0.02 * spacing && step.size < 1e-5 * spacing.max(rms) {
+            break;
+        }
+        pose = cleaned(step.motion.after(&pose), scale);
+    }
+    best
+}
+
+/// The exact system at a pose, with the size of its distances.
+struct ExactRows {
+    rows: NormalEquations,
+    rms: f64,
+    median: f64,
+}
+
+/// Rows of exact nearest places in both directions, untruncated, or weighted by Geman and McClure's function of a width.
+fn exact_rows(source: &View, target: &View, pose: &Rigid, samples: usize, width: Option<f64>) -> ExactRows {
+    struct Row {
+        place: glam::DVec3,
+        offset: glam::DVec3,
+        normal: glam::DVec3,
+    }
+    let inverse = pose.inverse();
+    let turn = pose.linear * pose.linear.determinant().abs().cbrt().recip();
+    let there: Vec<Row> = source.points[..samples.min(source.points.len())]
+        .par_iter()
+        .map(|&p| {
+            let place = pose.apply(p);
+            let touch = target.exact.touch(place);
+            Row {
+                place,
+                offset: place - touch.place,
+                normal: touch.normal,
+            }
+        })
+        .collect();
+    let back: Vec<Row> = target.points[..samples.min(target.points.len())]
+        .par_iter()
+        .map(|&x| {
+            let touch = source.exact.touch(inverse.apply(x));
+            let place = pose.apply(touch.place);
+            Row {
+                place,
+                offset: place - x,
+                normal: turn * touch.normal,
+            }
+        })
+        .collect();
+    let mut rows = NormalEquations::new(glam::DVec3::ZERO);
+    let mut square = 0.0;
+    for side in [&there, &back] {
+        let share = 1.0 / side.len().max(1) as f64;
+        for row in side {
+            let d2 = row.offset.length_squared();
+            square += 0.5 * share * d2;
+            let weight = share * width.map_or(1.0, |w| (1.0 + d2 / (w * w)).powi(-2));
+            // Away from the surface the distance grows along the offset; on it, along the normal.
+            let direction = if d2 > 1e-12 {
+                row.offset / d2.sqrt()
+            } else {
+                row.normal
+            };
+            let direction = if direction.dot(row.normal) < 0.0 {
+                -direction
+            } else {
+                direction
+            };
+            rows.add(row.place, direction, row.offset.dot(direction), weight);
+        }
+    }
+    let mut all: Vec<f64> = there.iter().chain(&back).map(|r| r.offset.length()).collect();
+    let middle = all.len() / 2;
+    let median = *all.select_nth_unstable_by(middle, f64::total_cmp).1;
+    ExactRows {
+        rows,
+        rms: square.sqrt(),
+        median,
+    }
+}
+
+/// The fit that down-weights what does not agree; `None` when the plain fit agrees about as well.
+fn robust_finish(source: &View, target: &View, start: Rigid, scale: bool) -> Option<WholeFit> {
+    let plain = Distances::new(source, target, &start, FINISH_SAMPLES);
+    let median = plain.quantile(0.5);
+    // Only a heavy tail asks for it; in a plain Gaussian the 98th percentile of |x| is 3.4 medians.
+    if median <= 1e-9 || plain.quantile(0.98) < 4.0 * median {
+        return None;
+    }
+    let mut pose = start;
+    let mut width = 3.0 * median;
+    let mut converged = false;
+    for _ in 0..40 {
+        let found = exact_rows(source, target, &pose, FINISH_SAMPLES, Some(width));
+        let step = found.rows.solve(scale, 0.0, 0.2)?;
+        pose = cleaned(step.motion.after(&pose), scale);
+        // Three medians are two standard deviations; never wider than before, so that the fit settles.
+        width = width.min(3.0 * found.median).max(1e-6);
+        converged = step.size < 1e-3 * source.spacing;
+        if step.size < 1e-10 {
+            break;
+        }
+    }
+    let robust = Distances::new(source, target, &pose, FINISH_SAMPLES);
+    (robust.quantile(0.5) < 0.5 * median).then(|| WholeFit {
+        pose,
+        rms: robust.rms(),
+        converged,
+    })
+}

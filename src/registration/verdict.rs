@@ -1,0 +1,380 @@
+//! The front door: which pose is reported, and what is said of it.
+//!
+//! 1. Both surfaces become views in one unit; for `mirror auto` the source's mirror image too.
+//! 2. Whole search for every allowed handedness. It is believed at once when both surfaces agree nearly everywhere, or when both
+//!    are closed and differ by no more than two persons' bones do.
+//! 3. Otherwise the partial search runs too, and wins when free space says so.
+//! 4. A mirrored pose must be clearly better than an unmirrored one.
+
+use super::oriented::{self, View};
+use super::partial::{self, RIVAL_DEG};
+use super::refine::{Level, equations};
+use super::result::{Conditioning, Hypothesis, Method, Registration};
+use super::score::{FINE, both_ways};
+use super::settings::{Extent, Mirror, RegistrationSettings};
+use super::shape::{RegistrationError, RegistrationShape};
+use super::surface::{self, Distances};
+use crate::geometry::Rigid;
+use glam::{DMat3, DVec3};
+
+/// Free-space score over which whole shapes agree nearly everywhere (2 is everywhere).
+const SURELY_WHOLE: f64 = 1.4;
+/// Largest symmetric distance of two closed shapes of one kind, in units; two persons' carpals reach 0.04.
+const ONE_KIND: f64 = 0.06;
+/// Closer than this a sample lies on the other surface, in units.
+const ON_SURFACE: f64 = 0.03;
+/// A mirrored whole pose must have at most this share of the unmirrored residual.
+const MIRROR_SHARE: f64 = 0.97;
+/// A mirrored partial pose must score this much more.
+const MIRROR_MARGIN: f64 = 0.05;
+/// Both handednesses fit about equally when their residuals are within this factor.
+const MIRROR_UNSURE: f64 = 1.05;
+/// A partial pose replaces a whole one when its free-space score is this much higher.
+const PARTIAL_MARGIN: f64 = 0.1;
+
+/// A pose in view coordinates.
+#[derive(Clone, Debug)]
+struct Candidate {
+    pose: Rigid,
+    mirrored: bool,
+    method: Method,
+    /// Symmetric distance (units) for whole poses, score for partial ones.
+    rms: f64,
+    score: f64,
+    converged: bool,
+}
+
+/// Finds the motion that takes `source` to `target`.
+///
+/// # Errors
+/// [`RegistrationError`] when a shape is empty, not finite, without extent or inconsistent, or a setting is out of range.
+///
+/// # Example
+/// ```
+/// use glam::{DMat3, DVec3};
+/// use medial_scaffold::geometry::{Rigid, TriangleMesh};
+/// use medial_scaffold::registration::{register, RegistrationSettings, RegistrationShape};
+/// // A box with three different edges, and the same box turned and moved.
+/// let corner = |i: u32| DVec3::new((i & 1) as f64 * 3.0, ((i >> 1) & 1) as f64 * 2.0, ((i >> 2) & 1) as f64);
+/// let target = TriangleMesh {
+///     points: (0..8).map(corner).collect(),
+///     triangles: vec![[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6], [0, 1, 4], [1, 5, 4],
+///                     [2, 6, 3], [3, 6, 7], [0, 4, 2], [2, 4, 6], [1, 3, 5], [3, 7, 5]],
+/// };
+/// let motion = Rigid { linear: DMat3::from_rotation_z(1.0), translation: DVec3::new(5.0, -2.0, 1.0) };
+/// let mut source = target.clone();
+/// source.points.iter_mut().for_each(|p| *p = motion.apply(*p));
+/// let found = register(
+///     &RegistrationShape::mesh(&target),
+///     &RegistrationShape::mesh(&source),
+///     &RegistrationSettings::default(),
+/// )?;
+/// assert!(found.rms < 1e-6);
+/// assert!(found.ambiguous); // a box looks the same after half a turn
+/// # Ok::<(), medial_scaffold::registration::RegistrationError>(())
+/// ```
+pub fn register(
+    target: &RegistrationShape,
+    source: &RegistrationShape,
+    settings: &RegistrationSettings,
+) -> Result<Registration, RegistrationError> {
+    settings.validate()?;
+    target.validate("target")?;
+    source.validate("source")?;
+    let unit = oriented::diagonal(target.points()).max(oriented::diagonal(source.points()));
+    let (target_view, source_view) = rayon::join(
+        || View::new(target, unit, settings.samples, settings.seed),
+        || View::new(source, unit, settings.samples, settings.seed.wrapping_add(1)),
+    );
+    let sources = match settings.mirror {
+        Mirror::No => vec![source_view],
+        Mirror::Yes => vec![source_view.mirror_image()],
+        Mirror::Auto => {
+            let image = source_view.mirror_image();
+            vec![source_view, image]
+        }
+    };
+    let search = Search {
+        target: &target_view,
+        sources: &sources,
+        settings,
+    };
+    let candidates = search.run();
+    Ok(search.report(candidates, unit))
+}
+
+struct Search<'a> {
+    target: &'a View,
+    sources: &'a [View],
+    settings: &'a RegistrationSettings,
+}
+
+impl Search<'_> {
+    fn view(&self, mirrored: bool) -> &View {
+        let matching = self.sources.iter().find(|v| v.mirrored == mirrored);
+        matching.expect("candidates come from these views")
+    }
+
+    /// All verified poses, the chosen one first.
+    fn run(&self) -> Vec<Candidate> {
+        let guesses: Vec<Vec<Rigid>> = self.sources.iter().map(|_| Vec::new()).collect();
+        let whole = match self.settings.extent {
+            Extent::Partial => Vec::new(),
+            _ => self.whole(&guesses),
+        };
+        if self.settings.extent == Extent::Whole || whole.first().is_some_and(|w| self.believed(w)) {
+            return whole;
+        }
+        let partial = self.partial(&guesses);
+        match (whole.first(), partial.first()) {
+            (Some(w), Some(p)) if p.score > w.score + PARTIAL_MARGIN => partial,
+            (None, _) => partial,
+            _ => whole,
+        }
+    }
+
+    fn believed(&self, fit: &Candidate) -> bool {
+        let source = self.view(fit.mirrored);
+        let closed = source.closed && self.target.closed;
+        fit.score > SURELY_WHOLE || (closed && fit.rms < ONE_KIND)
+    }
+
+    fn whole(&self, guesses: &[Vec<Rigid>]) -> Vec<Candidate> {
+        let mut out: Vec<Candidate> = Vec::new();
+        for (source, guesses) in self.sources.iter().zip(guesses) {
+            let fits = surface::whole(source, self.target, guesses, self.settings.scale, 4);
+            out.extend(fits.into_iter().map(|fit| Candidate {
+                score: both_ways(source, self.target, &fit.pose, usize::MAX, FINE),
+                pose: fit.pose,
+                mirrored: source.mirrored,
+                method: Method::Whole,
+                rms: fit.rms,
+                converged: fit.converged,
+            }));
+        }
+        let cost = |c: &Candidate| {
+            if c.mirrored && self.sources.len() > 1 {
+                c.rms / MIRROR_SHARE
+            } else {
+                c.rms
+            }
+        };
+        out.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+        out
+    }
+
+    fn partial(&self, guesses: &[Vec<Rigid>]) -> Vec<Candidate> {
+        let s = self.settings;
+        let mut out: Vec<Candidate> = Vec::new();
+        for (source, guesses) in self.sources.iter().zip(guesses) {
+            let fits = partial::partial(
+                source,
+                self.target,
+                guesses,
+                s.poses,
+                s.escalated_poses,
+                s.rival_share,
+                s.seed,
+            );
+            out.extend(fits.into_iter().map(|fit| Candidate {
+                pose: fit.pose,
+                mirrored: source.mirrored,
+                method: Method::Partial,
+                rms: 0.0,
+                score: fit.score,
+                converged: true,
+            }));
+        }
+        let gain = |c: &Candidate| {
+            if c.mirrored && self.sources.len() > 1 {
+                c.score - MIRROR_MARGIN
+            } else {
+                c.score
+            }
+        };
+        out.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+        out.truncate(s.hypotheses.max(2));
+        for c in &mut out {
+            c.rms = self.measure(c).rms;
+        }
+        if let Some(best) = out.first_mut() {
+            let source = self.sources.iter().find(|v| v.mirrored == best.mirrored);
+            let source = source.expect("the candidate came from it");
+            (best.pose, best.converged) = partial::settle(source, self.target, best.pose);
+        }
+        out
+    }
+
+    /// The report of the first candidate. There always is one: the whole search keeps its first guesses and the partial search
+    /// falls back to none only when no pair of points is alike.
+    fn report(&self, candidates: Vec<Candidate>, unit: f64) -> Registration {
+        let Some(best) = candidates.first().cloned() else {
+            return self.nothing(unit);
+        };
+        let source = self.view(best.mirrored);
+        let fit = self.measure(&best);
+        let ambiguity = self.ambiguity(&candidates);
+        let hypotheses = candidates
+            .iter()
+            .take(self.settings.hypotheses)
+            .map(|c| Hypothesis {
+                T_target_source: self.in_mm(c, unit),
+                score: c.score,
+                rms: c.rms * unit,
+                mirrored: c.mirrored,
+            })
+            .collect();
+        let pose = self.in_mm(&best, unit);
+        Registration {
+            T_target_source: pose,
+            scale: pose.linear.determinant().abs().cbrt(),
+            converged: best.converged,
+            mirrored: best.mirrored,
+            ambiguous: !ambiguity.is_empty(),
+            ambiguity,
+            hypotheses,
+            rms: fit.rms * unit,
+            p95: fit.p95 * unit,
+            max: fit.max * unit,
+            overlap: fit.overlap,
+            overlap_target: fit.overlap_target,
+            score: best.score,
+            method: best.method,
+            conditioning: self.conditioning(&best),
+            noise_source: source.noise * unit,
+            noise_target: self.target.noise * unit,
+        }
+    }
+
+    /// Said when the shapes share nothing at all: the centroids are joined and the result is not trusted.
+    fn nothing(&self, unit: f64) -> Registration {
+        let pose = Candidate {
+            pose: Rigid::IDENTITY,
+            mirrored: self.sources[0].mirrored,
+            method: Method::Partial,
+            rms: 0.0,
+            score: 0.0,
+            converged: false,
+        };
+        let mut out = self.report(vec![pose], unit);
+        out.ambiguity = vec!["no pair of points of one shape resembles one of the other".into()];
+        out.ambiguous = true;
+        out
+    }
+
+    fn ambiguity(&self, candidates: &[Candidate]) -> Vec<String> {
+        let s = self.settings;
+        let mut reasons = Vec::new();
+        let Some(best) = candidates.first() else {
+            return reasons;
+        };
+        let rival = candidates
+            .iter()
+            .skip(1)
+            .find(|c| c.mirrored == best.mirrored && c.pose.rotation_angle_deg(&best.pose) > RIVAL_DEG);
+        let other_hand = candidates.iter().find(|c| c.mirrored != best.mirrored);
+        match best.method {
+            Method::Whole => {
+                if let Some(r) = rival.filter(|r| r.rms < s.rival_residual * best.rms) {
+                    let angle = r.pose.rotation_angle_deg(&best.pose);
+                    let ratio = r.rms / best.rms;
+                    reasons.push(format!(
+                        "a pose {angle:.0} degrees away has only {ratio:.2} times the residual"
+                    ));
+                }
+                if let Some(o) =
+                    other_hand.filter(|o| o.rms.max(best.rms) < MIRROR_UNSURE * o.rms.min(best.rms))
+                {
+                    reasons.push(format!(
+                        "the other handedness fits as well: {:.3} times the residual",
+                        o.rms / best.rms
+                    ));
+                }
+            }
+            Method::Partial => {
+                if best.score < s.weak_score {
+                    reasons.push(format!("the surfaces hardly agree: score {:.2}", best.score));
+                }
+                if let Some(r) = rival.filter(|r| r.score > s.rival_share * best.score) {
+                    let angle = r.pose.rotation_angle_deg(&best.pose);
+                    reasons.push(format!(
+                        "a pose {angle:.0} degrees away scores {:.2} against {:.2}",
+                        r.score, best.score
+                    ));
+                }
+                if let Some(o) = other_hand.filter(|o| o.score > 0.9 * best.score) {
+                    reasons.push(format!(
+                        "the other handedness scores {:.2} against {:.2}",
+                        o.score, best.score
+                    ));
+                }
+            }
+        }
+        reasons
+    }
+
+    /// The motion from the source's frame to the target's, mm.
+    fn in_mm(&self, c: &Candidate, unit: f64) -> Rigid {
+        let source = self.view(c.mirrored);
+        let mirror = if c.mirrored {
+            DVec3::new(-1.0, 1.0, 1.0)
+        } else {
+            DVec3::ONE
+        };
+        let linear = c.pose.linear * DMat3::from_diagonal(mirror);
+        Rigid {
+            linear,
+            translation: self.target.centre + c.pose.translation * unit - linear * source.centre,
+        }
+    }
+
+    fn conditioning(&self, c: &Candidate) -> Conditioning {
+        let level = Level {
+            iterations: 1,
+            from: 0.06,
+            to: 0.06,
+            count: 2000,
+            exact: false,
+            cosine: 0.5,
+        };
+        let rows = equations(self.view(c.mirrored), self.target, &c.pose, level, level.from);
+        rows.conditioning(self.target.gyration(), self.settings.sliding_share)
+    }
+
+    /// Distances and overlap of a pose.
+    fn measure(&self, c: &Candidate) -> Measured {
+        let source = self.view(c.mirrored);
+        let d = Distances::new(source, self.target, &c.pose, usize::MAX);
+        let share = |d: &[f64]| d.iter().filter(|d| **d < ON_SURFACE).count() as f64 / d.len().max(1) as f64;
+        let (overlap, overlap_target) = (share(&d.there), share(&d.back));
+        let counted = match c.method {
+            Method::Whole => d,
+            Method::Partial => Distances {
+                there: d.there.into_iter().filter(|d| *d < ON_SURFACE).collect(),
+                back: d.back.into_iter().filter(|d| *d < ON_SURFACE).collect(),
+            },
+        };
+        let mut max = counted.quantile(1.0);
+        if c.method == Method::Whole {
+            for &v in &source.vertices {
+                let q = c.pose.apply(v);
+                max = max.max(self.target.exact.touch(q).place.distance(q));
+            }
+        }
+        Measured {
+            rms: counted.rms(),
+            p95: counted.quantile(0.95),
+            max,
+            overlap,
+            overlap_target,
+        }
+    }
+}
+
+struct Measured {
+    rms: f64,
+    p95: f64,
+    max: f64,
+    overlap: f64,
+    overlap_target: f64,
+}
