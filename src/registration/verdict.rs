@@ -29,6 +29,8 @@ const MIRROR_SHARE: f64 = 0.97;
 const MIRROR_MARGIN: f64 = 0.05;
 /// Both handednesses fit about equally when their residuals are within this factor.
 const MIRROR_UNSURE: f64 = 1.05;
+/// Residuals below this say nothing about which pose is right: facets of a tessellation make as much, in units.
+const INDISTINCT: f64 = 2e-4;
 /// A partial pose replaces a whole one when its free-space score is this much higher.
 const PARTIAL_MARGIN: f64 = 0.1;
 
@@ -275,19 +277,19 @@ impl Search<'_> {
         let other_hand = candidates.iter().find(|c| c.mirrored != best.mirrored);
         match best.method {
             Method::Whole => {
-                if let Some(r) = rival.filter(|r| r.rms < s.rival_residual * best.rms) {
+                if let Some(r) = rival.filter(|r| r.rms < s.rival_residual * best.rms.max(INDISTINCT)) {
                     let angle = r.pose.rotation_angle_deg(&best.pose);
-                    let ratio = r.rms / best.rms;
+                    let ratio = r.rms / best.rms.max(INDISTINCT);
                     reasons.push(format!(
                         "a pose {angle:.0} degrees away has only {ratio:.2} times the residual"
                     ));
                 }
-                if let Some(o) =
-                    other_hand.filter(|o| o.rms.max(best.rms) < MIRROR_UNSURE * o.rms.min(best.rms))
+                if let Some(o) = other_hand
+                    .filter(|o| o.rms.max(best.rms) < MIRROR_UNSURE * o.rms.min(best.rms).max(INDISTINCT))
                 {
                     reasons.push(format!(
                         "the other handedness fits as well: {:.3} times the residual",
-                        o.rms / best.rms
+                        o.rms / best.rms.max(INDISTINCT)
                     ));
                 }
             }
