@@ -6,22 +6,37 @@
 //! - [`vtp`]: sheets and curves for ParaView and 3D Slicer;
 //! - [`medial_files`]: `fine.ma`, ITK transforms, CSV tables;
 //! - [`colour`], [`scene`], [`glb`]: what is shown in 3D, as layers and as binary glTF;
+//! - [`still`], [`plot`]: pictures without a GPU, plots as SVG;
+//! - [`page`]: one offline HTML page with viewer, tables and data inside;
+//! - [`facts`], [`scaffold_report`], [`match_report`], [`change_report`]: the pages of the commands, from their JSON.
 //!
 //! Coordinates are LPS mm in every file, and every format that can say so does. Bytes depend on the data alone.
 
 pub mod atomic;
+pub mod change_report;
 pub mod colour;
+pub mod facts;
 pub mod glb;
+pub mod match_report;
 pub mod medial_files;
 pub mod mesh_files;
+pub mod page;
+pub mod plot;
+pub mod scaffold_report;
 pub mod scene;
+pub mod still;
 pub mod vtp;
 
 pub use atomic::{WriteError, write_atomically, write_bytes, write_json};
+pub use change_report::change_report;
 pub use glb::{glb_bytes, scene_from_glb};
+pub use match_report::match_report;
 pub use medial_files::{MedialMesh, write_csv, write_ma, write_tfm};
 pub use mesh_files::{
     FieldValues, PlyEncoding, VertexField, write_mesh, write_obj, write_off, write_ply, write_stl,
 };
+pub use page::{KeyFigure, NoteLevel, Plot, Report, ReportError, Section, Table};
+pub use scaffold_report::scaffold_report;
 pub use scene::{CorrespondenceLine, Layer, LayerKind, Quantity, Scene};
+pub use still::View;
 pub use vtp::{PolyData, curves_polydata, sheets_polydata, write_vtp};

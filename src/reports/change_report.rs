@@ -1,0 +1,353 @@
+//! The page of a change over time: each lesion before and after, its change with interval, and where it grew.
+//!
+//! In: `change.json`, `run.json` and a scene with surfaces of the shapes `baseline` and `followup` (the baseline carrying its
+//! growth as a signed quantity). Out: a [`Report`].
+
+use super::facts::{at, items, number, run_section, shown, text};
+use super::page::{KeyFigure, NoteLevel, Plot, Report, ReportError, Section, Table};
+use super::plot::{IntervalRow, interval_plot, pretty, signed};
+use super::scene::Scene;
+use serde_json::Value;
+
+/// The report of a change.
+///
+/// # Errors
+/// When `change.json` has no list of lesions.
+pub fn change_report(title: &str, change: &Value, run: &Value, scene: Scene) -> Result<Report, ReportError> {
+    if !at(change, "lesions").is_some_and(Value::is_array) {
+        return Err(ReportError::Missing {
+            field: "lesions".to_owned(),
+        });
+    }
+    let mut report = Report {
+        kind: "Change over time".to_owned(),
+        title: title.to_owned(),
+        subtitle: format!(
+            "{} paired, {} new, {} vanished",
+            items(change, "lesions").len(),
+            items(change, "new").len(),
+            items(change, "vanished").len()
+        ),
+        surface_colours: scene
+            .layers
+            .iter()
+            .find_map(|l| l.quantity.as_ref().map(|q| q.name.clone())),
+        scene,
+        result: change.clone(),
+        run: run.clone(),
+        ..Report::default()
+    };
+    figures(&mut report, change);
+    report.note(
+        NoteLevel::Info,
+        "Response categories are research calculations from one pair of segmentations; they do not replace a reading by the criteria's own rules.",
+    );
+    for w in items(run, "warnings")
+        .iter()
+        .chain(items(change, "warnings"))
+        .filter_map(Value::as_str)
+    {
+        report.note(NoteLevel::Warning, w);
+    }
+    report.section(changes(change));
+    report.section(measures(change));
+    report.section(agreement(change));
+    report.section(responses(change));
+    report.section(growth(change));
+    report.section(unpaired(change));
+    report.section(run_section(run));
+    Ok(report)
+}
+
+fn name(lesion: &Value) -> String {
+    match at(lesion, "name").and_then(Value::as_str) {
+        Some(name) if !name.is_empty() => name.to_owned(),
+        _ => format!("lesion {}", shown(lesion, "label")),
+    }
+}
+
+fn interval(value: &Value, path: &str) -> Option<[f64; 2]> {
+    Some([
+        number(value, &format!("{path}.0"))?,
+        number(value, &format!("{path}.1"))?,
+    ])
+}
+
+fn figures(report: &mut Report, change: &Value) {
+    for (label, field) in [
+        ("Total volume, baseline", "baseline"),
+        ("Total volume, follow-up", "followup"),
+    ] {
+        if number(change, &format!("totals.{field}_mm3")).is_some() {
+            let value = shown(change, &format!("totals.{field}_mm3"));
+            report.figures.push(KeyFigure::new(label, value, "mm\u{b3}"));
+        }
+    }
+    if let Some(percent) = number(change, "totals.percent") {
+        let note = interval(change, "totals.ci95_percent")
+            .map(|[lo, hi]| format!("95 %: {} to {} %", signed(lo), signed(hi)))
+            .unwrap_or_default();
+        report
+            .figures
+            .push(KeyFigure::new("Change", signed(percent), "%").note(note));
+    }
+    let significant = items(change, "lesions")
+        .iter()
+        .filter(|l| at(l, "change.significant").and_then(Value::as_bool) == Some(true))
+        .count();
+    report.figures.push(
+        KeyFigure::new("Beyond the measurement error", significant.to_string(), "")
+            .note(format!("of {} lesions", items(change, "lesions").len())),
+    );
+}
+
+fn changes(change: &Value) -> Section {
+    let mut section = Section::new("Volume change");
+    section.paragraphs.push(
+        "A change counts only when its 95 % interval does not contain zero. The interval follows from voxel size and the \
+         uncertainty of the boundary (or from repeated segmentations, when given)."
+            .to_owned(),
+    );
+    let mut rows = Vec::new();
+    let mut table = Table::new(
+        "",
+        &[
+            ":lesion",
+            "baseline [mm\u{b3}]",
+            "follow-up [mm\u{b3}]",
+            "change [mm\u{b3}]",
+            "change [%]",
+            "95 % interval [%]",
+            ":beyond error",
+        ],
+    );
+    for l in items(change, "lesions") {
+        let ends = interval(l, "change.ci95_percent");
+        table.row([
+            name(l),
+            shown(l, "baseline.volume_best"),
+            shown(l, "followup.volume_best"),
+            number(l, "change.volume_mm3").map_or_else(|| "-".to_owned(), signed),
+            number(l, "change.percent").map_or_else(|| "-".to_owned(), signed),
+            ends.map_or_else(
+                || "-".to_owned(),
+                |[lo, hi]| format!("{} to {}", signed(lo), signed(hi)),
+            ),
+            shown(l, "change.significant"),
+        ]);
+        if let (Some(value), Some(interval)) = (number(l, "change.percent"), ends) {
+            rows.push(IntervalRow {
+                label: name(l),
+                value,
+                interval,
+                significant: at(l, "change.significant").and_then(Value::as_bool) == Some(true),
+            });
+        }
+    }
+    if !rows.is_empty() {
+        section.plots.push(Plot {
+            svg: interval_plot("Volume change with 95 % interval", "%", &rows),
+            caption: "Red: grown, blue: shrunk, grey: within the error.".to_owned(),
+        });
+    }
+    if !table.rows.is_empty() {
+        section.tables.push(table);
+    }
+    section
+}
+
+/// Fields of a lesion at one date, with names and units.
+const MEASURES: [(&str, &str, &str); 15] = [
+    ("volume_mesh", "volume, marching cubes at 0.5", "mm\u{b3}"),
+    ("volume_voxel", "volume, voxel count", "mm\u{b3}"),
+    ("volume_smooth", "volume, smoothed surface", "mm\u{b3}"),
+    ("volume_scaffold", "volume, scaffold's surface", "mm\u{b3}"),
+    ("area", "surface area, marching cubes", "mm\u{b2}"),
+    ("area_smooth", "surface area, smoothed surface", "mm\u{b2}"),
+    ("sphericity", "sphericity", ""),
+    ("diameter_3d", "largest 3D diameter", "mm"),
+    ("diameter_axial", "longest axial diameter", "mm"),
+    ("diameter_perpendicular", "perpendicular to it", "mm"),
+    ("axis_major", "major axis", "mm"),
+    ("axis_minor", "minor axis", "mm"),
+    ("axis_least", "least axis", "mm"),
+    ("elongation", "elongation", ""),
+    ("flatness", "flatness", ""),
+];
+
+fn measures(change: &Value) -> Section {
+    let mut section = Section::new("Each lesion, both dates");
+    for l in items(change, "lesions") {
+        let mut table = Table::new(
+            &name(l),
+            &[":quantity", "baseline", "follow-up", "change [%]", ":unit"],
+        );
+        for (field, word, unit) in MEASURES {
+            let (a, b) = (
+                number(l, &format!("baseline.{field}")),
+                number(l, &format!("followup.{field}")),
+            );
+            if a.is_none() && b.is_none() {
+                continue;
+            }
+            let percent = match (a, b) {
+                (Some(a), Some(b)) if a != 0.0 => signed(100.0 * (b - a) / a),
+                _ => "-".to_owned(),
+            };
+            let cell = |x: Option<f64>| x.map_or_else(|| "-".to_owned(), pretty);
+            table.row([word.to_owned(), cell(a), cell(b), percent, unit.to_owned()]);
+        }
+        section.tables.push(table);
+    }
+    section
+}
+
+fn agreement(change: &Value) -> Section {
+    let mut section = Section::new("Overlap and surface distances");
+    section.paragraphs.push(
+        "Mesh convention: area-weighted point-to-surface distances between the surfaces. Voxel convention: distances between \
+         border voxels, as in common segmentation challenges. The two differ by up to a voxel and are named."
+            .to_owned(),
+    );
+    let mut table = Table::new(
+        "",
+        &[
+            ":lesion",
+            ":convention",
+            "Dice",
+            "Hausdorff [mm]",
+            "HD95 [mm]",
+            "mean [mm]",
+            "surface Dice",
+            "at tolerance [mm]",
+        ],
+    );
+    for l in items(change, "lesions") {
+        for convention in ["mesh", "voxel"] {
+            let Some(a) = at(l, &format!("agreement.{convention}")) else {
+                continue;
+            };
+            table.row([
+                name(l),
+                convention.to_owned(),
+                shown(l, "agreement.dice"),
+                shown(a, "hausdorff"),
+                shown(a, "hd95"),
+                shown(a, "assd"),
+                shown(a, "surface_dice"),
+                shown(l, "agreement.tolerance_mm"),
+            ]);
+        }
+    }
+    if table.rows.is_empty() {
+        return Section::default();
+    }
+    section.tables.push(table);
+    section
+}
+
+fn responses(change: &Value) -> Section {
+    let mut section = Section::new("Response categories");
+    let mut table = Table::new(
+        "Each by its own published thresholds",
+        &[
+            ":lesion",
+            ":RECIST 1.1 (diameter)",
+            ":RANO (product of diameters)",
+            ":volumetric (RANO 2.0)",
+        ],
+    );
+    for l in items(change, "lesions") {
+        let word = |criterion: &str| {
+            at(l, &format!("response.{criterion}")).map_or_else(
+                || "-".to_owned(),
+                |v| at(v, "category").map_or_else(|| text(v), text),
+            )
+        };
+        table.row([name(l), word("recist"), word("rano"), word("volumetric")]);
+    }
+    if let Some(r) = at(change, "totals.response") {
+        table.row([
+            "all lesions".to_owned(),
+            shown(r, "recist"),
+            shown(r, "rano"),
+            shown(r, "volumetric"),
+        ]);
+    }
+    if !table.rows.is_empty() {
+        section.tables.push(table);
+    }
+    section
+}
+
+fn growth(change: &Value) -> Section {
+    let mut section = Section::new("Where it changed");
+    section.paragraphs.push(
+        "Signed distance from the baseline surface to the follow-up surface, outward positive; the picture above shows it on \
+         the baseline. The residual compares the volume that these distances imply with the change measured directly."
+            .to_owned(),
+    );
+    let mut table = Table::new(
+        "",
+        &[
+            ":lesion",
+            "most outward [mm]",
+            "most inward [mm]",
+            "mean [mm]",
+            "identity residual [%]",
+        ],
+    );
+    let mut parts = Table::new(
+        "Part by part",
+        &[
+            ":lesion",
+            ":part",
+            "baseline [mm\u{b3}]",
+            "follow-up [mm\u{b3}]",
+            "change [mm\u{b3}]",
+            "share of change [%]",
+        ],
+    );
+    for l in items(change, "lesions") {
+        table.row([
+            name(l),
+            shown(l, "growth.max_outward"),
+            shown(l, "growth.max_inward"),
+            shown(l, "growth.mean"),
+            shown(l, "growth.identity_residual_percent"),
+        ]);
+        for p in items(l, "parts") {
+            parts.row([
+                name(l),
+                shown(p, "name"),
+                shown(p, "baseline_mm3"),
+                shown(p, "followup_mm3"),
+                number(p, "change_mm3").map_or_else(|| "-".to_owned(), signed),
+                shown(p, "share_percent"),
+            ]);
+        }
+    }
+    if table.rows.is_empty() {
+        return Section::default();
+    }
+    section.tables.push(table);
+    if !parts.rows.is_empty() {
+        section.tables.push(parts);
+    }
+    section
+}
+
+fn unpaired(change: &Value) -> Section {
+    let mut section = Section::new("New, vanished, split and merged");
+    for (key, word) in [
+        ("new", "New"),
+        ("vanished", "Vanished"),
+        ("split", "Split"),
+        ("merged", "Merged"),
+    ] {
+        for l in items(change, key) {
+            section.paragraphs.push(format!("{word}: {}.", text(l)));
+        }
+    }
+    section
+}

@@ -1,0 +1,226 @@
+//! The page of a match: target and source aligned, what corresponds, and how the shapes differ.
+//!
+//! In: `match.json`, `run.json` and a scene whose layers are named by the shapes `target` and `source` (source layers already
+//! moved). Out: a [`Report`].
+
+use super::facts::{at, facts_table, items, number, run_section, shown, text};
+use super::page::{KeyFigure, NoteLevel, Report, ReportError, Section, Table};
+use super::plot::{pretty, signed};
+use super::scene::Scene;
+use crate::geometry::Rigid;
+use glam::{DMat3, DVec3};
+use serde_json::Value;
+
+/// The report of a match.
+///
+/// # Errors
+/// When `match.json` lacks its transform.
+pub fn match_report(title: &str, result: &Value, run: &Value, scene: Scene) -> Result<Report, ReportError> {
+    let motion = transform(result)?;
+    let mut report = Report {
+        kind: "Match".to_owned(),
+        title: title.to_owned(),
+        subtitle: "Target and source, aligned by T_target_source".to_owned(),
+        scene,
+        T_target_source: Some(motion),
+        result: result.clone(),
+        run: run.clone(),
+        ..Report::default()
+    };
+    figures(&mut report, result, &motion);
+    notes(&mut report, result, run);
+    report.section(pose(result, &motion));
+    report.section(difference(result));
+    report.section(correspondences(result));
+    report.section(edit(result));
+    report.section(run_section(run));
+    Ok(report)
+}
+
+fn transform(result: &Value) -> Result<Rigid, ReportError> {
+    let missing = || ReportError::Missing {
+        field: "T_target_source".to_owned(),
+    };
+    let rows: [[f64; 4]; 4] = at(result, "T_target_source")
+        .and_then(|v| serde_json::from_value(v.clone()).ok())
+        .ok_or_else(missing)?;
+    let column = |j: usize| DVec3::new(rows[0][j], rows[1][j], rows[2][j]);
+    Ok(Rigid {
+        linear: DMat3::from_cols(column(0), column(1), column(2)),
+        translation: column(3),
+    })
+}
+
+fn figures(report: &mut Report, r: &Value, motion: &Rigid) {
+    for (label, field) in [
+        ("Surface distance, rms", "rms"),
+        ("95th percentile", "p95"),
+        ("Largest", "max"),
+    ] {
+        if number(r, field).is_some() {
+            report.figures.push(KeyFigure::new(label, shown(r, field), "mm"));
+        }
+    }
+    if let Some(v) = number(r, "difference.volume_change_percent") {
+        report.figures.push(
+            KeyFigure::new("Volume, source to target", signed(v), "%").note(format!(
+                "{} \u{2192} {} mm\u{b3}",
+                shown(r, "difference.volume_source"),
+                shown(r, "difference.volume_target")
+            )),
+        );
+    }
+    if let Some(v) = number(r, "overlap") {
+        report
+            .figures
+            .push(KeyFigure::new("Overlap", pretty(100.0 * v), "%"));
+    }
+    if let Some(v) = number(r, "shape_distance") {
+        report
+            .figures
+            .push(KeyFigure::new("Shape distance", pretty(v), ""));
+    }
+    let angle = if motion.is_mirrored() {
+        let unmirrored = Rigid {
+            linear: -motion.linear,
+            ..*motion
+        };
+        unmirrored.rotation_angle_deg(&Rigid::IDENTITY)
+    } else {
+        motion.rotation_angle_deg(&Rigid::IDENTITY)
+    };
+    report.figures.push(
+        KeyFigure::new("Rotation", pretty(angle), "\u{b0}").note(if motion.is_mirrored() {
+            "after a point reflection"
+        } else {
+            ""
+        }),
+    );
+    if let Some(ok) = at(r, "converged").and_then(Value::as_bool) {
+        let ambiguous = at(r, "ambiguous").and_then(Value::as_bool).unwrap_or(false);
+        let (word, good) = match (ok, ambiguous) {
+            (true, false) => ("decided", true),
+            (true, true) => ("ambiguous", false),
+            (false, _) => ("not converged", false),
+        };
+        report.figures.push(KeyFigure::new("Pose", word, "").check(good));
+    }
+}
+
+fn notes(report: &mut Report, r: &Value, run: &Value) {
+    let flag = |field: &str| at(r, field).and_then(Value::as_bool).unwrap_or(false);
+    if flag("mirrored") {
+        report.note(
+            NoteLevel::Info,
+            "The source is the mirror image of the target (a left and a right side); it was mirrored before alignment.",
+        );
+    }
+    if flag("ambiguous") {
+        report.note(
+            NoteLevel::Warning,
+            "Other poses fit almost as well (see the hypotheses): the shape is nearly symmetric, or the overlap too small to decide.",
+        );
+    }
+    for w in items(run, "warnings")
+        .iter()
+        .chain(items(r, "warnings"))
+        .filter_map(Value::as_str)
+    {
+        report.note(NoteLevel::Warning, w);
+    }
+}
+
+fn pose(r: &Value, motion: &Rigid) -> Section {
+    let mut section = Section::new("Pose");
+    section.paragraphs.push(
+        "T_target_source takes source coordinates to target coordinates (LPS mm, column vectors).".to_owned(),
+    );
+    let mut matrix = Table::new("T_target_source", &["", "", "", "mm"]);
+    for row in motion.to_rows() {
+        matrix.row(row.map(|x| format!("{x:.6}")));
+    }
+    section.tables.push(matrix);
+    let hypotheses = items(r, "hypotheses");
+    if !hypotheses.is_empty() {
+        let mut table = Table::new(
+            "Hypotheses, best first",
+            &["rank", "score", "rotation from the best [\u{b0}]"],
+        );
+        for (i, h) in hypotheses.iter().enumerate() {
+            let angle = transform(h)
+                .ok()
+                .filter(|t| t.is_mirrored() == motion.is_mirrored())
+                .map_or_else(|| "mirrored".to_owned(), |t| pretty(t.rotation_angle_deg(motion)));
+            table.row([(i + 1).to_string(), shown(h, "score"), angle]);
+        }
+        section.tables.push(table);
+    }
+    section
+}
+
+fn difference(r: &Value) -> Section {
+    let mut section = Section::new("Shape difference");
+    let Some(Value::Object(map)) = at(r, "difference") else {
+        return section;
+    };
+    let mut table = Table::new("", &[":quantity", "value", ":unit"]);
+    for (key, value) in map.iter().filter(|(_, v)| v.is_number()) {
+        let unit = if key.ends_with("percent") {
+            "%"
+        } else if key.starts_with("volume") {
+            "mm\u{b3}"
+        } else if key.starts_with("area") {
+            "mm\u{b2}"
+        } else {
+            "mm"
+        };
+        table.row([key.replace('_', " "), text(value), unit.to_owned()]);
+    }
+    section.tables.push(table);
+    let sheets = items(r, "difference.per_sheet");
+    if let Some(Value::Object(first)) = sheets.first() {
+        let names: Vec<&str> = first
+            .iter()
+            .filter(|(_, v)| !v.is_object())
+            .map(|(k, _)| k.as_str())
+            .collect();
+        let mut table = Table::new("Sheet by sheet", &names);
+        for s in sheets {
+            table.row(names.iter().map(|n| shown(s, n)));
+        }
+        section.tables.push(table);
+    }
+    section
+}
+
+fn correspondences(r: &Value) -> Section {
+    let mut section = Section::new("Correspondences");
+    for (key, word) in [("nodes", "Nodes"), ("curves", "Curves"), ("sheets", "Sheets")] {
+        let list = items(r, &format!("correspondences.{key}"));
+        if list.is_empty() {
+            continue;
+        }
+        let mut table = Table::new(word, &["target", "source", "weight"]);
+        for c in list {
+            table.row(["target", "source", "weight"].map(|f| shown(c, f)));
+        }
+        section.tables.push(table);
+    }
+    for (key, word) in [
+        ("unmatched_target", "Only in the target"),
+        ("unmatched_source", "Only in the source"),
+    ] {
+        if let Some(value) = at(r, &format!("correspondences.{key}")) {
+            section.paragraphs.push(format!("{word}: {}.", text(value)));
+        }
+    }
+    section
+}
+
+fn edit(r: &Value) -> Section {
+    let mut section = Section::new("Edit distance");
+    if let Some(value) = at(r, "edit") {
+        section.tables.push(facts_table("", value));
+    }
+    section
+}

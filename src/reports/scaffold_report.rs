@@ -1,0 +1,296 @@
+//! The page of one scaffold.
+//!
+//! In: `scaffold.json`, `run.json` and the scene. Out: a [`Report`] with the bone, translucent, its sheets, curves and nodes;
+//! how many elements each tolerance keeps; tables of sheets, curves and nodes; topology and fidelity checks.
+
+use super::facts::{at, items, number, required, run_section, shown};
+use super::page::{KeyFigure, NoteLevel, Plot, Report, ReportError, Section, Table};
+use super::plot::{Chart, Marker, Series, SeriesStyle, pretty};
+use super::scene::Scene;
+use serde_json::Value;
+
+/// The report of a scaffold named `title`.
+///
+/// # Errors
+/// When `scaffold.json` lacks its counts or tolerance.
+pub fn scaffold_report(
+    title: &str,
+    scaffold: &Value,
+    run: &Value,
+    scene: Scene,
+) -> Result<Report, ReportError> {
+    let tolerance = required(scaffold, "tolerance_mm")?;
+    let mut report = Report {
+        kind: "Medial scaffold".to_owned(),
+        title: title.to_owned(),
+        subtitle: subtitle(scaffold),
+        scene,
+        tolerance_mm: Some(tolerance),
+        result: scaffold.clone(),
+        run: run.clone(),
+        ..Report::default()
+    };
+    figures(&mut report, scaffold, tolerance)?;
+    notes(&mut report, scaffold, run);
+    report.section(simplification(scaffold, tolerance));
+    report.section(sheets(scaffold));
+    report.section(curves(scaffold));
+    report.section(nodes(scaffold));
+    report.section(checks(scaffold));
+    report.section(run_section(run));
+    Ok(report)
+}
+
+fn subtitle(scaffold: &Value) -> String {
+    let mut parts = Vec::new();
+    if let Some(n) = number(scaffold, "full.generators") {
+        parts.push(format!("{n} points"));
+    }
+    if let Some(n) = number(scaffold, "surface.triangles") {
+        parts.push(format!("{n} surface triangles"));
+    }
+    if let Some(frame) = at(scaffold, "frame").and_then(Value::as_str) {
+        parts.push(format!("frame {frame}"));
+    }
+    parts.join(", ")
+}
+
+fn figures(report: &mut Report, s: &Value, tolerance: f64) -> Result<(), ReportError> {
+    if number(s, "surface.volume").is_some() {
+        report
+            .figures
+            .push(KeyFigure::new("Volume", shown(s, "surface.volume"), "mm\u{b3}"));
+        report.figures.push(KeyFigure::new(
+            "Surface area",
+            shown(s, "surface.area"),
+            "mm\u{b2}",
+        ));
+    }
+    for (label, field) in [
+        ("Sheets", "sheets"),
+        ("Axial curves", "axial_curves"),
+        ("Ribs", "rib_curves"),
+    ] {
+        let n = required(s, &format!("counts.{field}"))?;
+        report.figures.push(KeyFigure::new(label, pretty(n), ""));
+    }
+    report
+        .figures
+        .push(KeyFigure::new("Tolerance", pretty(tolerance), "mm").note("how much the shape may change"));
+    if number(s, "fidelity.hausdorff").is_some() {
+        let percent = number(s, "fidelity.hausdorff_percent_diag")
+            .map(|p| format!("{} % of the diagonal", pretty(p)))
+            .unwrap_or_default();
+        report
+            .figures
+            .push(KeyFigure::new("Shape change", shown(s, "fidelity.hausdorff"), "mm").note(percent));
+    }
+    if let Some(agree) = at(s, "topology.agree").and_then(Value::as_bool) {
+        report.figures.push(
+            KeyFigure::new("Topology", if agree { "agrees" } else { "differs" }, "")
+                .note(format!("Betti numbers {}", shown(s, "topology.scaffold_betti")))
+                .check(agree),
+        );
+    }
+    Ok(())
+}
+
+fn notes(report: &mut Report, s: &Value, run: &Value) {
+    for w in items(run, "warnings")
+        .iter()
+        .chain(items(s, "warnings"))
+        .filter_map(Value::as_str)
+    {
+        report.note(NoteLevel::Warning, w);
+    }
+    if at(s, "topology.agree").and_then(Value::as_bool) == Some(false) {
+        report.note(
+            NoteLevel::Error,
+            format!(
+                "The scaffold's Betti numbers ({}) are not the solid's ({}); do not rely on its topology.",
+                shown(s, "topology.scaffold_betti"),
+                shown(s, "topology.solid_betti")
+            ),
+        );
+    }
+}
+
+/// Number of elements whose persistence is at least x, as a step line over the persistences.
+fn survivors(name: &str, colour: &str, persistences: &mut [f64], from: f64) -> Series {
+    persistences.sort_by(f64::total_cmp);
+    let n = persistences.len();
+    let mut points = vec![[from, n as f64]];
+    for (i, p) in persistences.iter().enumerate() {
+        points.push([p.max(from), (n - i - 1) as f64]);
+    }
+    Series {
+        name: name.to_owned(),
+        colour: colour.to_owned(),
+        style: SeriesStyle::Step,
+        points,
+    }
+}
+
+fn persistences(s: &Value, list: &str, kinds: &[&str]) -> Vec<f64> {
+    items(s, list)
+        .iter()
+        .filter(|c| {
+            kinds.is_empty()
+                || at(c, "kind")
+                    .and_then(Value::as_str)
+                    .is_some_and(|k| kinds.contains(&k))
+        })
+        .filter_map(|c| number(c, "persistence"))
+        .filter(|p| p.is_finite())
+        .collect()
+}
+
+fn simplification(s: &Value, tolerance: f64) -> Section {
+    let mut section = Section::new("What each tolerance keeps");
+    let mut sheets = persistences(s, "sheets", &[]);
+    let mut axial = persistences(s, "curves", &["axial", "wire"]);
+    if sheets.is_empty() && axial.is_empty() {
+        return section;
+    }
+    section.paragraphs.push(
+        "Every sheet and curve carries its persistence: how much of the shape must be given up before it goes. \
+         A long flat step is a stable level of detail; the slider beside the picture hides what lies below a level."
+            .to_owned(),
+    );
+    let from = tolerance.min(sheets.iter().chain(&axial).copied().fold(f64::INFINITY, f64::min));
+    let mut series = Vec::new();
+    if !sheets.is_empty() {
+        series.push(survivors("sheets", "#3a86c8", &mut sheets, from));
+    }
+    if !axial.is_empty() {
+        series.push(survivors("axial curves and wires", "#d61f29", &mut axial, from));
+    }
+    let chart = Chart {
+        title: "Elements kept at each tolerance".to_owned(),
+        x_label: "tolerance [mm]".to_owned(),
+        y_label: "elements kept".to_owned(),
+        series,
+        markers: vec![Marker {
+            x: tolerance,
+            label: format!("this run, {} mm", pretty(tolerance)),
+        }],
+    };
+    section.plots.push(Plot {
+        svg: chart.svg(),
+        caption: "Sheets and curves that a tolerance keeps.".to_owned(),
+    });
+    let shares: Vec<[f64; 2]> = items(s, "sheets")
+        .iter()
+        .filter_map(|x| Some([number(x, "id")?, 100.0 * number(x, "volume_share")?]))
+        .collect();
+    if !shares.is_empty() {
+        let chart = Chart {
+            title: "Share of the volume nearest to each sheet".to_owned(),
+            x_label: "sheet".to_owned(),
+            y_label: "share of volume [%]".to_owned(),
+            series: vec![Series {
+                name: "share".to_owned(),
+                colour: "#5b8fbf".to_owned(),
+                style: SeriesStyle::Bars,
+                points: shares,
+            }],
+            markers: Vec::new(),
+        };
+        section.plots.push(Plot {
+            svg: chart.svg(),
+            caption: "How much of the solid each sheet stands for.".to_owned(),
+        });
+    }
+    section
+}
+
+fn sheets(s: &Value) -> Section {
+    let mut section = Section::new("Sheets");
+    let mut table = Table::new(
+        "",
+        &[
+            "sheet",
+            "persistence [mm]",
+            "area [mm\u{b2}]",
+            "mean radius [mm]",
+            "largest radius [mm]",
+            "volume share [%]",
+            "generators",
+            "boundary chains",
+        ],
+    );
+    for x in items(s, "sheets") {
+        table.row([
+            shown(x, "id"),
+            shown(x, "persistence"),
+            shown(x, "area"),
+            shown(x, "mean_radius"),
+            shown(x, "max_radius"),
+            number(x, "volume_share").map_or_else(|| "-".to_owned(), |v| pretty(100.0 * v)),
+            shown(x, "generators"),
+            items(x, "boundary").len().to_string(),
+        ]);
+    }
+    if !table.rows.is_empty() {
+        section.tables.push(table);
+    }
+    section
+}
+
+fn curves(s: &Value) -> Section {
+    let mut section = Section::new("Curves");
+    let mut table = Table::new(
+        "",
+        &[
+            "curve",
+            ":kind",
+            "persistence [mm]",
+            "length [mm]",
+            ":closed",
+            ":nodes",
+            ":sheets",
+        ],
+    );
+    for x in items(s, "curves") {
+        table.row(["id", "kind", "persistence", "length", "closed", "nodes", "sheets"].map(|f| shown(x, f)));
+    }
+    if !table.rows.is_empty() {
+        section.tables.push(table);
+    }
+    section
+}
+
+fn nodes(s: &Value) -> Section {
+    let mut section = Section::new("Nodes");
+    let mut table = Table::new("", &["node", ":type", "radius [mm]", ":position [mm]", ":curves"]);
+    for x in items(s, "nodes") {
+        table.row(["id", "type", "radius", "position", "curves"].map(|f| shown(x, f)));
+    }
+    if !table.rows.is_empty() {
+        section.tables.push(table);
+    }
+    section
+}
+
+fn checks(s: &Value) -> Section {
+    let mut section = Section::new("Checks");
+    section.paragraphs.push(
+        "The alternating sum of sources, relays and sinks of the full scaffold is 1 for every point set, and the \
+         scaffold's Betti numbers (components, tunnels, cavities) must equal those of the solid, counted independently."
+            .to_owned(),
+    );
+    for (key, caption) in [
+        ("topology", "Topology"),
+        ("full", "Full scaffold"),
+        ("surface", "Surface"),
+        (
+            "fidelity",
+            "Distance between the shape and what the scaffold gives back",
+        ),
+    ] {
+        if let Some(value) = at(s, key) {
+            section.tables.push(super::facts::facts_table(caption, value));
+        }
+    }
+    section
+}
