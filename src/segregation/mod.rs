@@ -1,22 +1,40 @@
 //! Segregation: splitting the full scaffold into the part that crosses the surface (triangles) and the rest.
 //!
-//! In: the triangulation, and the known surface when the input has one. Out: [`Segregation`]: the surface mesh over the
-//! generators and the inside/outside label of every tetrahedron.
+//! In: the triangulation, and the known surface when the input has one; or a raw cloud. Out: [`Segregation`]: the surface
+//! mesh over the generators and the inside/outside label of every tetrahedron.
 //!
-//! * [`known_surface`]: a mesh or mask says where its surface is; one winding number a region;
-//!   [`refine`] adds generators where that does not give the surface's topology.
+//! * [`known_surface`]: a mesh or mask says where its surface is; one winding number a region ([`flood`]); [`refine`] adds
+//!   generators where that does not give the surface's topology.
+//! * [`cloud`]: a raw cloud is prepared ([`prepare`]: outliers, noise), shows its surface by greedy gap transforms
+//!   ([`gap_transforms`]), is closed ([`closure`]: [`diffusion`], [`min_cut`], [`islands`], [`star_repair`], [`adopt`]),
+//!   judged open or closed ([`openness`]), oriented ([`orient`]) and reported ([`report`]).
 
+pub mod adopt;
 pub mod balls;
+pub mod closure;
+pub mod cloud;
+pub mod diffusion;
 pub mod error;
+pub mod facets;
 pub mod flood;
+pub mod gap_transforms;
+pub mod islands;
 pub mod known_queries;
 pub mod known_surface;
 pub mod labels;
+pub mod min_cut;
+pub mod openness;
+pub mod orient;
+pub mod prepare;
 pub mod refine;
+pub mod report;
+pub mod star_repair;
 mod stars;
 
 pub use balls::Balls;
+pub use cloud::{ClosedOrOpen, CloudSegregation, Denoise, SegregationSettings, segregate_cloud};
 pub use error::SegregationError;
+pub use gap_transforms::CostRule;
 pub use known_queries::KnownSurface;
 pub use known_surface::{
     KnownSurfaceReport, KnownSurfaceSegregation, KnownSurfaceSettings, RefinementPlace, RefinementReason,
@@ -24,3 +42,4 @@ pub use known_surface::{
 };
 pub use labels::{Segregation, boundary_facets, boundary_triangles};
 pub use refine::{RefinedSegregation, segregate_known_refined};
+pub use report::CloudReport;

@@ -1,0 +1,112 @@
+//! Orientation of an open surface, as far as one exists.
+//!
+//! In: triangles. Out: the same triangles, each component turned alike from its first triangle on across edges with exactly
+//! two triangles, and whether that met no contradiction (a Moebius band does). Closed components are turned outward by their
+//! signed volume. `O(n log n)`.
+
+use super::openness::area;
+use glam::DVec3;
+
+/// Oriented triangles.
+#[derive(Clone, Debug, Default)]
+pub struct Oriented {
+    /// The triangles, in the order given.
+    pub triangles: Vec<[u32; 3]>,
+    /// Whether every component is orientable.
+    pub orientable: bool,
+}
+
+/// One directed side of a triangle.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Side {
+    edge: (u32, u32),
+    triangle: u32,
+    forward: bool,
+}
+
+/// Propagates orientation; see the module.
+pub fn orient(points: &[DVec3], triangles: &[[u32; 3]]) -> Oriented {
+    let mut sides: Vec<Side> = triangles
+        .iter()
+        .enumerate()
+        .flat_map(|(i, t)| {
+            [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])].map(|(a, b)| Side {
+                edge: (a.min(b), a.max(b)),
+                triangle: i as u32,
+                forward: a < b,
+            })
+        })
+        .collect();
+    sides.sort_unstable();
+    // Neighbours across manifold edges, with whether both run the edge the same way (then one must be turned).
+    let mut links: Vec<Vec<(u32, bool)>> = vec![Vec::new(); triangles.len()];
+    for run in sides.chunk_by(|a, b| a.edge == b.edge) {
+        if let [a, b] = run {
+            let turn = a.forward == b.forward;
+            links[a.triangle as usize].push((b.triangle, turn));
+            links[b.triangle as usize].push((a.triangle, turn));
+        }
+    }
+    let mut out = Oriented {
+        triangles: triangles.to_vec(),
+        orientable: true,
+    };
+    let mut turned: Vec<Option<bool>> = vec![None; triangles.len()];
+    for start in 0..triangles.len() {
+        if turned[start].is_some() {
+            continue;
+        }
+        turned[start] = Some(false);
+        let mut members = vec![start];
+        let mut at = 0;
+        while at < members.len() {
+            let t = members[at];
+            at += 1;
+            let own = turned[t].expect("members are turned or not");
+            for &(next, turn) in &links[t] {
+                match turned[next as usize] {
+                    None => {
+                        turned[next as usize] = Some(own != turn);
+                        members.push(next as usize);
+                    }
+                    Some(state) => out.orientable &= state == (own != turn),
+                }
+            }
+        }
+        for &t in &members {
+            if turned[t] == Some(true) {
+                out.triangles[t].swap(1, 2);
+            }
+        }
+        turn_outward(points, &mut out.triangles, &members);
+    }
+    out
+}
+
+/// A component is turned so that its signed volume about its centroid is positive: outward when it is closed, away from
+/// the side it bulges to when it is open.
+fn turn_outward(points: &[DVec3], triangles: &mut [[u32; 3]], members: &[usize]) {
+    let mut weight = 0.0;
+    let mut centre = DVec3::ZERO;
+    for &t in members {
+        let a = area(points, triangles[t]);
+        weight += a;
+        centre += a * triangles[t].iter().map(|&i| points[i as usize]).sum::<DVec3>() / 3.0;
+    }
+    if weight <= 0.0 {
+        return;
+    }
+    centre /= weight;
+    let volume: f64 = members
+        .iter()
+        .map(|&t| {
+            let [a, b, c] = triangles[t].map(|i| points[i as usize] - centre);
+            a.dot(b.cross(c))
+        })
+        .sum();
+    if volume < 0.0 {
+        for &t in members {
+            triangles[t].swap(1, 2);
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! What a segregation of a raw cloud says of itself: decisions, numbers, holes, doubts.
+
+use super::islands::Island;
+use super::openness::{Patch, Rim};
+use super::prepare::PrepareReport;
+use crate::geometry::MeshTopology;
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// Everything worth knowing of a cloud segregation.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CloudReport {
+    /// Outliers, noise, smoothing, thinning.
+    pub prepare: PrepareReport,
+    /// Open or closed, and why.
+    pub decision: Decision,
+    /// Topology of the surface.
+    pub topology: MeshTopology,
+    /// Surface components, most points first.
+    pub components: Vec<ComponentReport>,
+    /// Parts that the closed surface closed without any points to support it: holes that were filled.
+    pub filled_holes: Vec<Patch>,
+    /// Borders of the surface: holes that were left.
+    pub rims: Vec<Rim>,
+    /// Small parts that were removed or filled.
+    pub islands: Vec<Island>,
+    /// Counts of the closing stage.
+    pub closing: ClosingReport,
+    /// A run with other random choices, when one was made.
+    pub second_opinions: Vec<SecondOpinion>,
+    /// Reasons to look at the result before using it; empty when there are none.
+    pub doubts: Vec<String>,
+}
+
+impl CloudReport {
+    /// Whether the result marks itself as doubtful.
+    pub fn doubtful(&self) -> bool {
+        !self.doubts.is_empty()
+    }
+}
+
+/// Open or closed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Decision {
+    /// Whether the surface was taken to be closed.
+    pub closed: bool,
+    /// Whether the user said so, or the area decided.
+    pub by_user: bool,
+    /// Share of the closed surface's area that no points support.
+    pub unsupported_area_share: f64,
+    /// Share above which a cloud is taken to be open.
+    pub threshold: f64,
+    /// The decision in words.
+    pub reason: String,
+}
+
+/// One component of the surface.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ComponentReport {
+    /// Points on it.
+    pub points: usize,
+    /// Area, mm^2.
+    pub area_mm2: f64,
+    /// Enclosed volume, mm^3, when closed (negative: a cavity).
+    pub volume_mm3: Option<f64>,
+    /// Euler number.
+    pub euler: i64,
+    /// Open edges.
+    pub boundary_edges: usize,
+    /// Mean of its points, mm.
+    pub place: DVec3,
+}
+
+/// Counts of the closing stage.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ClosingReport {
+    /// Triangles of the greedy surface.
+    pub greedy_triangles: usize,
+    /// Greedy triangles undone on the way.
+    pub greedy_undone: usize,
+    /// Iterations of the diffusion.
+    pub diffusion_iterations: usize,
+    /// Pinched vertices before the star repair.
+    pub pinched: usize,
+    /// Tetrahedra flipped by the star repair.
+    pub flips: usize,
+    /// Pinched vertices after it.
+    pub left_pinched: usize,
+    /// Points taken onto the surface at the end.
+    pub adopted: usize,
+    /// Points off the surface, dropped before a second run.
+    pub dropped: usize,
+    /// Points off the surface at the end.
+    pub off: usize,
+    /// Share of the points that were off the surface at first.
+    pub off_share: f64,
+}
+
+/// The outcome of a run with another seed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SecondOpinion {
+    /// Its seed.
+    pub seed: u64,
+    /// Its Euler number.
+    pub euler: i64,
+    /// Its components.
+    pub components: usize,
+}
