@@ -120,3 +120,169 @@ pub fn data_mesh(folder: &str, word: &str) -> Option<TriangleMesh> {
         triangles: stl.faces.iter().map(|f| f.vertices.map(|i| i as u32)).collect(),
     })
 }
+
+/// A box of the given size with its corner at the origin.
+pub fn cuboid(size: DVec3) -> TriangleMesh {
+    let corner = |i: u32| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2)) * size;
+    TriangleMesh {
+        points: (0..8).map(corner).collect(),
+        triangles: vec![
+            [0, 2, 1],
+            [1, 2, 3],
+            [4, 5, 6],
+            [5, 7, 6],
+            [0, 1, 4],
+            [1, 5, 4],
+            [2, 6, 3],
+            [3, 6, 7],
+            [0, 4, 2],
+            [2, 4, 6],
+            [1, 3, 5],
+            [3, 7, 5],
+        ],
+    }
+}
+
+/// A right prism over a regular polygon of `n` corners.
+pub fn prism(n: u32, radius: f64, height: f64) -> TriangleMesh {
+    let mut points = Vec::new();
+    for z in [0.0, height] {
+        for i in 0..n {
+            let a = TAU * f64::from(i) / f64::from(n);
+            points.push(DVec3::new(radius * a.cos(), radius * a.sin(), z));
+        }
+    }
+    let mut triangles = Vec::new();
+    for i in 0..n {
+        let j = (i + 1) % n;
+        triangles.extend([[i, j, n + j], [i, n + j, n + i]]);
+        if i > 0 && j > 0 {
+            triangles.extend([[0, j, i], [n, n + i, n + j]]);
+        }
+    }
+    TriangleMesh { points, triangles }
+}
+
+/// A tube of the given radius round a closed curve.
+pub fn tube(curve: impl Fn(f64) -> DVec3, radius: f64, n: u32, m: u32) -> TriangleMesh {
+    let at = |i: u32| curve(TAU * f64::from(i) / f64::from(n));
+    let tangent = |i: u32| (at((i + 1) % n) - at((i + n - 1) % n)).normalize();
+    // A frame carried along the curve; the turn left over after one round is spread evenly.
+    let mut normals = vec![tangent(0).any_orthonormal_vector()];
+    for i in 1..=n {
+        let t = tangent(i % n);
+        let before = normals[i as usize - 1];
+        normals.push((before - t * before.dot(t)).normalize());
+    }
+    let (first, last) = (normals[0], normals[n as usize]);
+    let t = tangent(0);
+    let turn = first.cross(last).dot(t).atan2(first.dot(last));
+    let mut points = Vec::new();
+    for i in 0..n {
+        let t = tangent(i);
+        let u = normals[i as usize];
+        let v = t.cross(u);
+        let start = -turn * f64::from(i) / f64::from(n);
+        for j in 0..m {
+            let a = start + TAU * f64::from(j) / f64::from(m);
+            points.push(at(i) + radius * (u * a.cos() + v * a.sin()));
+        }
+    }
+    let index = |i: u32, j: u32| (i % n) * m + j % m;
+    let mut triangles = Vec::new();
+    for i in 0..n {
+        for j in 0..m {
+            let (a, b, c, d) = (index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1));
+            triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    let mut mesh = TriangleMesh { points, triangles };
+    if mesh.signed_volume() < 0.0 {
+        mesh.flip();
+    }
+    mesh
+}
+
+/// A trefoil knot as a tube.
+pub fn knot() -> TriangleMesh {
+    tube(
+        |t| {
+            DVec3::new(
+                t.sin() + 2.0 * (2.0 * t).sin(),
+                t.cos() - 2.0 * (2.0 * t).cos(),
+                -(3.0 * t).sin(),
+            )
+        },
+        0.45,
+        300,
+        24,
+    )
+}
+
+/// Shapes with exact meshes, by name.
+pub fn shapes() -> Vec<(String, TriangleMesh)> {
+    let mut ellipsoid = sphere(1.0, 80);
+    for p in &mut ellipsoid.points {
+        *p *= DVec3::new(1.0, 0.7, 0.5);
+    }
+    vec![
+        ("ellipsoid".to_owned(), ellipsoid),
+        ("torus".to_owned(), torus(1.0, 0.4, 160, 64)),
+        ("box".to_owned(), cuboid(DVec3::new(1.0, 1.4, 2.0))),
+        ("prism".to_owned(), prism(5, 1.0, 1.5)),
+        ("knot".to_owned(), knot()),
+    ]
+}
+
+/// A shape of the data folder, the triangles of all its parts; `None` (and a word) when it is not there.
+pub fn data_shape(path: &str) -> Option<TriangleMesh> {
+    use medial_scaffold::input::{Geometry, ReadSettings, read_shape};
+    let file = data()?.join(path);
+    if !file.is_file() {
+        println!("skipped: no {path} (set MEDIAL_DATA to the folder of real shapes)");
+        return None;
+    }
+    let shape = read_shape(&file, &ReadSettings::default()).expect("a readable file");
+    match shape.geometry {
+        Geometry::Mesh(mesh) => Some(mesh),
+        _ => None,
+    }
+}
+
+/// A sampled shape with isotropic Gaussian noise, a density that changes by the given ratio along x, and outliers in the
+/// bounding box inflated by a tenth.
+pub fn corrupted(
+    mesh: &TriangleMesh,
+    n: usize,
+    sigma: f64,
+    density: f64,
+    outliers: f64,
+    seed: u64,
+) -> Vec<DVec3> {
+    use rand_distr::{Distribution, StandardNormal};
+    let [low, high] = mesh.bounds().expect("a mesh with points");
+    let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(1_000_000));
+    let mut points = Vec::with_capacity(n);
+    let mut round = 0;
+    while points.len() < n {
+        for p in sample(mesh, n, seed.wrapping_mul(1009).wrapping_add(round)) {
+            let share = (p.x - low.x) / (high.x - low.x);
+            if points.len() < n && (density <= 1.0 || rng.random::<f64>() < density.powf(share - 1.0)) {
+                points.push(p);
+            }
+        }
+        round += 1;
+    }
+    if sigma > 0.0 {
+        for p in &mut points {
+            let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+            *p += sigma * DVec3::new(normal(), normal(), normal());
+        }
+    }
+    let margin = 0.1 * (high - low);
+    for _ in 0..(outliers * n as f64) as usize {
+        let u = DVec3::new(rng.random(), rng.random(), rng.random());
+        points.push(low - margin + u * (high - low + 2.0 * margin));
+    }
+    points
+}

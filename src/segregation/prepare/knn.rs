@@ -45,10 +45,8 @@ impl KnnLists {
     /// Lists after the points not marked are dropped: `points` are those left, in their old order.
     pub fn keep(&self, points: &[DVec3], keep: &[bool]) -> Self {
         let mut place = vec![u32::MAX; keep.len()];
-        let mut next = 0u32;
-        for (slot, _) in place.iter_mut().zip(keep).filter(|(_, k)| **k) {
-            *slot = next;
-            next += 1;
+        for (next, (slot, _)) in place.iter_mut().zip(keep).filter(|(_, k)| **k).enumerate() {
+            *slot = next as u32;
         }
         let tree = Neighbours::new(points);
         let k = self.k.min(points.len());
