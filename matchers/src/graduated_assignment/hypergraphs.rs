@@ -8,40 +8,12 @@
 //!
 //! Cost: a start takes a few hundred gradient steps, each O(I_target I_source) for I incidences.
 
-use super::anneal::{AnnealSettings, anneal};
 use super::discrete::Discrete;
-use super::objective::{HypergraphObjective, Objective};
-use super::starts::{self, StartKind};
+use super::multistart::{MatchSettings, Maximum, maximise};
+use super::objective::HypergraphObjective;
+use super::starts::StartKind;
 use crate::matching_problem::{ElementMap, MatchingProblem};
-use crate::table::Table;
 use serde::{Deserialize, Serialize};
-
-/// How to match hypergraphs.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct MatchSettings {
-    /// Cooling of every start.
-    pub anneal: AnnealSettings,
-    /// Use the uniform start.
-    pub uniform_start: bool,
-    /// Use the spectral start.
-    pub spectral_start: bool,
-    /// How much of a hypothesis' start is the hypothesis itself, in [0, 1].
-    pub hypothesis_trust: f64,
-    /// Most moves of one local search.
-    pub max_moves: usize,
-}
-
-impl Default for MatchSettings {
-    fn default() -> Self {
-        Self {
-            anneal: AnnealSettings::default(),
-            uniform_start: true,
-            spectral_start: true,
-            hypothesis_trust: 0.8,
-            max_moves: 10_000,
-        }
-    }
-}
 
 /// One matched pair.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -50,7 +22,7 @@ pub struct MatchedPair {
     pub target: u32,
     /// Source element.
     pub source: u32,
-    /// Soft assignment at the end of annealing, in [0, 1]: near 1 when nothing competes.
+    /// Mean-field probability of the pair, in [0, 1]: near 1 when nothing competes.
     pub confidence: f64,
     /// Gain of the pair in the match it is in (its own and its couplings'), in the weights' unit: what the match
     /// would lose without it.
@@ -107,87 +79,8 @@ pub fn match_hypergraphs(
     settings: &MatchSettings,
 ) -> HypergraphMatch {
     let objective = HypergraphObjective::new(problem);
-    let mut kinds = Vec::new();
-    if settings.uniform_start {
-        kinds.push(StartKind::Uniform);
-    }
-    if settings.spectral_start {
-        kinds.push(StartKind::Spectral);
-    }
-    kinds.extend((0..hypotheses.len()).map(StartKind::Hypothesis));
-    if kinds.is_empty() {
-        kinds.push(StartKind::Uniform);
-    }
-    let mut best: Option<Candidate> = None;
-    let mut prices = Vec::new();
-    for kind in kinds {
-        let candidate = run_start(problem, &objective, kind, hypotheses, settings);
-        prices.push(candidate.price);
-        if best.as_ref().is_none_or(|b| candidate.price < b.price) {
-            best = Some(candidate);
-        }
-    }
-    let best = best.expect("there is at least one start");
-    report(problem, best, prices)
-}
-
-struct Candidate {
-    state: Discrete,
-    soft: Vec<Table>,
-    price: f64,
-    start: StartKind,
-    converged: bool,
-}
-
-fn run_start(
-    problem: &MatchingProblem,
-    objective: &HypergraphObjective,
-    kind: StartKind,
-    hypotheses: &[ElementMap],
-    settings: &MatchSettings,
-) -> Candidate {
-    let start = match kind {
-        StartKind::Uniform => starts::uniform(objective),
-        StartKind::Spectral => starts::spectral(objective),
-        StartKind::Hypothesis(k) => {
-            starts::hypothesis(objective, &columns_of(&hypotheses[k]), settings.hypothesis_trust)
-        }
-    };
-    let annealed = anneal(objective, start, &settings.anneal);
-    let mut state = polish(
-        objective,
-        Discrete::from_soft(objective, &annealed.soft),
-        settings,
-    );
-    if let StartKind::Hypothesis(k) = kind {
-        // Annealing may leave the hypothesis; its own polished end competes too.
-        let kept = polish(
-            objective,
-            Discrete::from_columns(objective, &columns_of(&hypotheses[k])),
-            settings,
-        );
-        if kept.gain > state.gain {
-            state = kept;
-        }
-    }
-    let price = problem.price(&map_of(&state));
-    Candidate {
-        state,
-        soft: annealed.soft,
-        price,
-        start: kind,
-        converged: annealed.converged,
-    }
-}
-
-fn polish(objective: &impl Objective, mut state: Discrete, settings: &MatchSettings) -> Discrete {
-    loop {
-        let mut improved = state.ascend(objective);
-        improved |= state.local_search(objective, settings.max_moves);
-        if !improved {
-            return state;
-        }
-    }
+    let columns: Vec<_> = hypotheses.iter().map(columns_of).collect();
+    report(problem, maximise(&objective, &columns, settings))
 }
 
 fn columns_of(map: &ElementMap) -> Vec<Vec<Option<usize>>> {
@@ -204,7 +97,7 @@ fn map_of(state: &Discrete) -> ElementMap {
     }
 }
 
-fn report(problem: &MatchingProblem, best: Candidate, prices: Vec<f64>) -> HypergraphMatch {
+fn report(problem: &MatchingProblem, best: Maximum) -> HypergraphMatch {
     let map = map_of(&best.state);
     let pairs = |kind: usize| -> Vec<MatchedPair> {
         let matched = map.source_of_target[kind].iter().enumerate();
@@ -224,18 +117,15 @@ fn report(problem: &MatchingProblem, best: Candidate, prices: Vec<f64>) -> Hyper
             .collect()
     };
     let total = problem.total();
+    let price = problem.price(&map);
     HypergraphMatch {
         nodes: pairs(0),
         curves: pairs(1),
         sheets: pairs(2),
-        price: best.price,
-        similarity: if total > 0.0 {
-            1.0 - best.price / total
-        } else {
-            1.0
-        },
+        price,
+        similarity: if total > 0.0 { 1.0 - price / total } else { 1.0 },
         start: best.start,
-        prices,
+        prices: best.gains.iter().map(|g| total - g).collect(),
         converged: best.converged,
         map,
     }

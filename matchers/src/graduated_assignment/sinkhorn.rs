@@ -4,7 +4,8 @@
 //! `M_xy = exp(S_xy + u_x + v_y)` whose rows and columns sum to one together with their slack entries
 //! `exp(slack + u_x)` and `exp(slack + v_y)`: the maximum-entropy doubly sub-stochastic table for those scores.
 //!
-//! 1. Start the potentials at `u_x = -max(slack, max_y S_xy)`, so that no exponential exceeds one.
+//! 1. Take the column potentials of the call before (zero at first), and `u_x = -max(slack, max_y (S_xy + v_y))`, so that
+//!    no exponential exceeds one. Scores change little from call to call, so a few sweeps do.
 //! 2. Tabulate `exp(S + u + v)` once and balance by multiplying row and column factors only.
 //! 3. When a factor leaves `[1e-50, 1e50]`, move its logarithm into the potentials and tabulate again.
 //!
@@ -18,7 +19,7 @@ use crate::table::Table;
 /// Factors beyond this size are absorbed into the potentials.
 const ABSORB: f64 = 1e50;
 
-/// Scratch of the balancing, reused between calls.
+/// Scratch of the balancing; the column potentials of one call are where the next call starts.
 #[derive(Debug, Clone, Default)]
 pub struct Sinkhorn {
     u: Vec<f64>,
@@ -69,7 +70,15 @@ impl Sinkhorn {
                 *value *= a * b;
             }
         }
+        self.absorb();
         sweeps
+    }
+
+    /// Keeps the column potentials for the next balancing when the temperature falls by `cooling` in between.
+    ///
+    /// Potentials are differences of score, which grow as the temperature falls.
+    pub fn cool(&mut self, cooling: f64) {
+        self.v.iter_mut().for_each(|v| *v /= cooling);
     }
 
     fn tabulate(&mut self, scores: &Table, out: &mut Table) {
