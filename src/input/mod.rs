@@ -4,12 +4,14 @@
 //! * `formats`: one reader a format, on a cursor that knows its place (`scan`, `scalar`, `decompress`).
 //! * [`error`]: what can be wrong and how it is said.
 //! * [`shape`]: what comes out.
+//! * [`sampling`]: from a shape to generators.
 
 mod decompress;
 pub mod error;
 mod formats;
 mod parsed;
 pub mod read;
+pub mod sampling;
 mod scalar;
 mod scan;
 pub mod shape;
@@ -17,4 +19,8 @@ pub mod shape;
 pub use error::{Fault, Flaw, Place, ReadError};
 pub use parsed::{Frame, Units};
 pub use read::{ReadSettings, read_bytes, read_shape};
+pub use sampling::{
+    LabelSurface, LabelSurfaceSettings, Sampling, SamplingError, SamplingSettings, label_surface, sample,
+    sample_mesh,
+};
 pub use shape::{Generators, Geometry, LabelCount, LabelMap, PointCloud, Provenance, Shape, SourceFormat};

@@ -207,9 +207,7 @@ fn format_of_content(head: &[u8]) -> Option<SourceFormat> {
     };
     if first_word == b"ply" {
         Some(SourceFormat::Ply)
-    } else if stl::is_binary(head) {
-        Some(SourceFormat::Stl)
-    } else if first_word == b"solid" {
+    } else if stl::is_binary(head) || first_word == b"solid" {
         Some(SourceFormat::Stl)
     } else if off::is_keyword(first_word) {
         Some(SourceFormat::Off)
@@ -405,7 +403,7 @@ fn usable_points(points: &[DVec3]) -> Result<(), Flaw> {
         ));
     }
     for (i, p) in points.iter().enumerate() {
-        if !(p.abs().max_element() <= LARGEST_MM) {
+        if !p.is_finite() || p.abs().max_element() > LARGEST_MM {
             return Err(Flaw::new(
                 Place::Element {
                     kind: "point",

@@ -305,10 +305,7 @@ impl Axes {
         if integer(dimension.text.as_bytes(), "dimension", dimension.place)? != sizes.len() as i64 {
             return Err(sizes_field.flaw(Fault::Header, "the dimension and the number of sizes differ"));
         }
-        let directions = fields
-            .get(&["space directions"])
-            .map(|f| directions(f))
-            .transpose()?;
+        let directions = fields.get(&["space directions"]).map(directions).transpose()?;
         let directions = directions.unwrap_or_else(|| vec![None; sizes.len()]);
         if directions.len() != sizes.len() {
             return Err(sizes_field.flaw(
