@@ -40,6 +40,10 @@ pub mod regularise;
 
 pub mod coarse_scaffold;
 
+pub mod measures;
+
 pub mod reports;
 
 pub mod registration;
+
+pub mod pipeline;

@@ -1,2 +1,9 @@
-//! The medial command.
-fn main() {}
+//! `medial`: the medial scaffold of anatomical shapes, from the command line.
+
+#![forbid(unsafe_code)]
+
+mod cli;
+
+fn main() -> std::process::ExitCode {
+    cli::main()
+}

@@ -18,6 +18,24 @@ pub struct Shape {
     pub warnings: Vec<String>,
 }
 
+impl Shape {
+    /// A shape made in memory, in LPS mm.
+    pub fn generated(name: &str, geometry: Geometry) -> Self {
+        Self {
+            name: name.to_owned(),
+            geometry,
+            provenance: Provenance {
+                path: PathBuf::from(name),
+                format: SourceFormat::Generated,
+                sha256: String::new(),
+                frame: "lps".to_owned(),
+                units: "mm".to_owned(),
+            },
+            warnings: Vec::new(),
+        }
+    }
+}
+
 /// The three kinds of input.
 #[derive(Clone, Debug)]
 pub enum Geometry {

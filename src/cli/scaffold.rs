@@ -1,0 +1,165 @@
+//! `medial scaffold`: the scaffold of one shape, as files, a report, or JSON on stdout.
+
+use super::common::Common;
+use super::output::{make_dir, print_json, print_text};
+use super::progress::Progress;
+use super::run_record::RunRecord;
+use super::{Failure, Verdict, warn_all};
+use clap::Args;
+use medial_scaffold::coarse_scaffold::Host;
+use medial_scaffold::geometry::Rigid;
+use medial_scaffold::measures::thickness;
+use medial_scaffold::pipeline::{ScaffoldRun, scaffold};
+use medial_scaffold::reports::{
+    MedialMesh, PlyEncoding, Quantity, Scene, VertexField, colour, curves_polydata, glb_bytes,
+    scaffold_report, sheets_polydata, write_bytes, write_json, write_ma, write_ply, write_vtp,
+};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `medial scaffold`.
+#[derive(Debug, Args)]
+pub struct ScaffoldArgs {
+    /// Point cloud, surface mesh or segmentation mask.
+    shape: PathBuf,
+
+    /// Output directory.
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+}
+
+/// Runs the command.
+pub fn run(args: &ScaffoldArgs, common: &Common) -> Result<Verdict, Failure> {
+    if args.output.is_none() && !common.json {
+        return Err(Failure::usage(
+            "nowhere to put the result; give an output directory with -o DIR, or --json",
+        ));
+    }
+    let shape = common.read(&args.shape)?;
+    let progress = Progress::new(common.quiet);
+    let mut last = Verdict::Fine;
+    for &side in common.side.sides() {
+        let settings = common.scaffold_settings(side);
+        let done = scaffold(&shape, &settings, &|stage| progress.stage(stage))?;
+        let mut record = RunRecord::new(common, &settings)?;
+        record.inputs.push(shape.provenance.clone());
+        record.stages = done.stages.clone();
+        record.warnings = done.warnings.clone();
+        if let Some(dir) = &args.output {
+            let dir = if common.side.sides().len() > 1 {
+                dir.join(side_name(side))
+            } else {
+                dir.clone()
+            };
+            progress.stage("files");
+            write_files(&dir, &done, &mut record, common)?;
+        }
+        progress.finish();
+        warn_all(common, &done.warnings);
+        if common.json {
+            print_json(&done.document())?;
+        } else if !common.quiet {
+            print_text(&summary(&done))?;
+        }
+        if !done.topology.agree {
+            last = Verdict::SaidNo;
+        }
+    }
+    Ok(last)
+}
+
+fn side_name(side: medial_scaffold::fine_scaffold::Side) -> &'static str {
+    match side {
+        medial_scaffold::fine_scaffold::Side::Interior => "interior",
+        medial_scaffold::fine_scaffold::Side::Exterior => "exterior",
+    }
+}
+
+/// A few lines for a terminal.
+fn summary(done: &ScaffoldRun) -> String {
+    let document = done.document();
+    let (c, s, t) = (document.counts, document.surface, document.topology);
+    format!(
+        "{}: {} sheets, {} axial curves, {} ribs, {} wires, {} nodes at tolerance {:.4} mm\n\
+         surface: {} vertices, {} triangles, Euler number {}, {}{:.2} mm^2\n\
+         Betti numbers: solid {:?}, scaffold {:?} ({}); Morse number {}\n\
+         fidelity: at most {:.4} mm ({:.2} % of the diagonal)\n",
+        document.name,
+        c.sheets,
+        c.axial_curves,
+        c.rib_curves,
+        c.wires,
+        c.nodes,
+        document.tolerance_mm,
+        s.vertices,
+        s.triangles,
+        s.euler,
+        s.volume
+            .map_or(String::from("open, "), |v| format!("closed, {v:.2} mm^3, ")),
+        s.area,
+        <[i64; 3]>::from(t.solid_betti),
+        <[i64; 3]>::from(t.scaffold_betti),
+        if t.agree { "agree" } else { "DISAGREE" },
+        document.full.morse,
+        document.fidelity.hausdorff,
+        document.fidelity.hausdorff_percent_diag,
+    )
+}
+
+/// Writes everything the contract names into `dir`.
+pub fn write_files(
+    dir: &Path,
+    done: &ScaffoldRun,
+    record: &mut RunRecord,
+    common: &Common,
+) -> Result<(), Failure> {
+    make_dir(dir)?;
+    let document = done.document();
+    write_json(&dir.join("scaffold.json"), &document)?;
+    let thickness = thickness(&done.fine, &done.regularised);
+    let hosts = done.coarse.fine.generator_host.iter().map(|h| match h {
+        Host::Sheet(sheet) => sheet.0 as i32,
+        _ => -1,
+    });
+    let fields = [
+        VertexField::real("thickness", thickness.clone()),
+        VertexField::integer("sheet", hosts.collect()),
+    ];
+    write_ply(
+        &dir.join("surface.ply"),
+        &done.surface,
+        &fields,
+        PlyEncoding::default(),
+    )?;
+    write_ma(&dir.join("fine.ma"), &MedialMesh::from_scaffold(&done.coarse))?;
+    write_vtp(&dir.join("sheets.vtp"), &sheets_polydata(&done.coarse))?;
+    write_vtp(&dir.join("curves.vtp"), &curves_polydata(&done.coarse))?;
+    let scene = scene(done, &thickness);
+    write_bytes(&dir.join("scene.glb"), glb_bytes(&scene))?;
+    record.write(dir)?;
+    if !common.no_report {
+        let title = format!("Medial scaffold of {}", done.name);
+        let report = scaffold_report(&title, &json(&document)?, &json(record)?, scene)?;
+        write_bytes(&dir.join("report.html"), report.html()?)?;
+    }
+    Ok(())
+}
+
+/// The 3D scene: the translucent surface coloured by thickness, and the scaffold in it.
+fn scene(done: &ScaffoldRun, thickness: &[f64]) -> Scene {
+    let mut scene = Scene::default();
+    let values = thickness.iter().map(|&t| t as f32).collect();
+    scene.add_surface(
+        "",
+        &done.surface,
+        colour::BONE,
+        Some(Quantity::positive("thickness", "mm", values)),
+    );
+    scene.add_scaffold("", &done.coarse, &Rigid::IDENTITY);
+    scene
+}
+
+/// A document as a JSON value, for the report.
+pub fn json<T: serde::Serialize>(value: &T) -> Result<Value, Failure> {
+    Ok(serde_json::to_value(value)?)
+}

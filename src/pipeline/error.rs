@@ -1,0 +1,48 @@
+//! Why a pipeline stopped: the stage, and what it said.
+
+use crate::delaunay::DelaunayError;
+use crate::fine_scaffold::FineScaffoldError;
+use crate::input::sampling::SamplingError;
+use crate::registration::RegistrationError;
+use crate::regularise::RegulariseError;
+use crate::segregation::SegregationError;
+use thiserror::Error;
+
+/// The error of a stage, with the name of the shape it stopped at.
+#[derive(Debug, Error)]
+#[error("{shape}: {source}")]
+pub struct PipelineError {
+    /// Name or path of the shape.
+    pub shape: String,
+    /// What the stage said.
+    #[source]
+    pub source: StageError,
+}
+
+/// The error of one stage.
+#[derive(Debug, Error)]
+#[allow(missing_docs)]
+pub enum StageError {
+    #[error(transparent)]
+    Sampling(#[from] SamplingError),
+    #[error(transparent)]
+    Delaunay(#[from] DelaunayError),
+    #[error(transparent)]
+    Segregation(#[from] SegregationError),
+    #[error(transparent)]
+    FineScaffold(#[from] FineScaffoldError),
+    #[error(transparent)]
+    Regularise(#[from] RegulariseError),
+    #[error(transparent)]
+    Registration(#[from] RegistrationError),
+}
+
+impl StageError {
+    /// Names the shape.
+    pub(super) fn of(self, shape: &str) -> PipelineError {
+        PipelineError {
+            shape: shape.to_owned(),
+            source: self,
+        }
+    }
+}
