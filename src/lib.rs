@@ -44,6 +44,8 @@ pub mod measures;
 
 pub mod reports;
 
+pub mod matching;
+
 pub mod registration;
 
 pub mod pipeline;

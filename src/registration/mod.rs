@@ -12,7 +12,7 @@
 //! |---|---|
 //! | `shape`, `settings`, `result` | what goes in and what comes out |
 //! | `oriented`, `denoise`, `cells`, `nearest_grid`, `exact` | a surface prepared for search |
-//! | `surface`, `starts` | whole shapes |
+//! | `surface` | whole shapes |
 //! | `partial`, `pairs` | partial shapes |
 //! | `score`, `refine`, `solve` | shared by both: free space, closest points, one linear step |
 //! | `verdict` | which pose is reported and what is said of it |
@@ -32,7 +32,6 @@ mod score;
 mod settings;
 mod shape;
 mod solve;
-mod starts;
 mod surface;
 mod verdict;
 

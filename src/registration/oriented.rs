@@ -15,8 +15,8 @@ use super::exact::{ExactSurface, PointTree};
 use super::nearest_grid::NearestGrid;
 use super::shape::{RegistrationShape, Surface};
 use crate::geometry::TriangleMesh;
-use glam::{DMat3, DVec3};
-use nalgebra::Matrix3;
+use crate::matching::moments::{Moments, moments};
+use glam::DVec3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -26,16 +26,6 @@ const CELL: f64 = 0.02;
 const MARGIN: f64 = 0.25;
 /// Most raw points that take part in de-noising: more do not improve 4 000 wanted ones and cost time.
 const MOST_RAW: usize = 20_000;
-
-/// First and second moments of a surface.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Moments {
-    pub(crate) centroid: DVec3,
-    /// Standard deviations along the axes, largest first.
-    pub(crate) deviations: DVec3,
-    /// Principal axes as columns, right-handed.
-    pub(crate) axes: DMat3,
-}
 
 /// One surface, prepared.
 pub(crate) struct View {
@@ -59,35 +49,6 @@ pub(crate) struct View {
     pub(crate) centre: DVec3,
     /// Handedness was changed.
     pub(crate) mirrored: bool,
-}
-
-/// Mean, deviations and axes of equally weighted points.
-pub(crate) fn moments(points: &[DVec3]) -> Moments {
-    let n = points.len().max(1) as f64;
-    let centroid = points.iter().copied().sum::<DVec3>() / n;
-    let mut m = Matrix3::<f64>::zeros();
-    for p in points {
-        let d = *p - centroid;
-        for r in 0..3 {
-            for c in 0..3 {
-                m[(r, c)] += d[r] * d[c] / n;
-            }
-        }
-    }
-    let eigen = m.symmetric_eigen();
-    let mut order = [0, 1, 2];
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    let axis = |k: usize| {
-        let v = eigen.eigenvectors.column(order[k]);
-        DVec3::new(v[0], v[1], v[2])
-    };
-    let deviation = |k: usize| eigen.eigenvalues[order[k]].max(0.0).sqrt();
-    let (x, y) = (axis(0), axis(1));
-    Moments {
-        centroid,
-        deviations: DVec3::new(deviation(0), deviation(1), deviation(2)),
-        axes: DMat3::from_cols(x, y, x.cross(y)),
-    }
 }
 
 /// Diagonal of the box along the principal axes, mm.

@@ -2,7 +2,7 @@
 //!
 //! In: two views, extra first guesses (from the scaffolds). Out: verified poses, best first.
 //!
-//! 1. First guesses: moments with flips, swaps and spins ([`super::starts`]), the scaffolds' own, each handedness allowed.
+//! 1. First guesses: moments with flips, swaps and spins ([`crate::matching`]), the scaffolds' own, each handedness allowed.
 //! 2. Every guess: 12 iterations on 150 points of each surface, nearest points from the table, tolerance from half the diagonal
 //!    to 15 %. Ranked by symmetric root mean square distance, within 8 degrees of a better one dropped, 8 kept.
 //! 3. Again with 500 points to 10 %, 4 kept.
@@ -17,8 +17,8 @@
 use super::oriented::View;
 use super::refine::{Level, refine};
 use super::solve::{NormalEquations, cleaned};
-use super::starts;
 use crate::geometry::Rigid;
+use crate::matching::moments::from_moments;
 use rayon::prelude::*;
 
 /// Poses nearer than this are one pose, degrees.
@@ -94,7 +94,7 @@ pub(crate) fn whole(
     keep: usize,
 ) -> Vec<WholeFit> {
     let mut poses = guesses.to_vec();
-    poses.extend(starts::from_moments(&target.moments, &source.moments));
+    poses.extend(from_moments(&target.moments, &source.moments));
     let rough = Level {
         iterations: 12,
         from: 0.5,

@@ -15,6 +15,7 @@ use super::settings::{Extent, Mirror, RegistrationSettings};
 use super::shape::{RegistrationError, RegistrationShape};
 use super::surface::{self, Distances};
 use crate::geometry::Rigid;
+use crate::matching::{MatchingSettings, pose_hypotheses};
 use glam::{DMat3, DVec3};
 
 /// Free-space score over which whole shapes agree nearly everywhere (2 is everywhere).
@@ -96,18 +97,65 @@ pub fn register(
             vec![source_view, image]
         }
     };
+    let guesses: Vec<Vec<Rigid>> = sources
+        .iter()
+        .map(|view| scaffold_guesses(target, source, &target_view, view, unit, settings))
+        .collect();
     let search = Search {
         target: &target_view,
         sources: &sources,
+        guesses: &guesses,
         settings,
     };
     let candidates = search.run();
     Ok(search.report(candidates, unit))
 }
 
+/// Poses that the scaffolds allow, in view coordinates; none when a scaffold is missing.
+fn scaffold_guesses(
+    target: &RegistrationShape,
+    source: &RegistrationShape,
+    target_view: &View,
+    source_view: &View,
+    unit: f64,
+    settings: &RegistrationSettings,
+) -> Vec<Rigid> {
+    let (Some(t), Some(s)) = (target.scaffold, source.scaffold) else {
+        return Vec::new();
+    };
+    let matching = MatchingSettings {
+        mirrored: source_view.mirrored,
+        seed: settings.seed,
+        ..Default::default()
+    };
+    let flip = mirror_of(source_view.mirrored);
+    pose_hypotheses(t, s, &matching)
+        .iter()
+        .map(|h| {
+            let linear = h.T_target_source.linear * flip;
+            let centre = h.T_target_source.apply(source_view.centre);
+            Rigid {
+                linear,
+                translation: (centre - target_view.centre) / unit,
+            }
+        })
+        .collect()
+}
+
+/// What a mirrored view does to the source's coordinates about its centre.
+fn mirror_of(mirrored: bool) -> DMat3 {
+    DMat3::from_diagonal(if mirrored {
+        DVec3::new(-1.0, 1.0, 1.0)
+    } else {
+        DVec3::ONE
+    })
+}
+
 struct Search<'a> {
     target: &'a View,
     sources: &'a [View],
+    /// First guesses from the scaffolds, in view coordinates, one list a source view.
+    guesses: &'a [Vec<Rigid>],
     settings: &'a RegistrationSettings,
 }
 
@@ -119,15 +167,14 @@ impl Search<'_> {
 
     /// All verified poses, the chosen one first.
     fn run(&self) -> Vec<Candidate> {
-        let guesses: Vec<Vec<Rigid>> = self.sources.iter().map(|_| Vec::new()).collect();
         let whole = match self.settings.extent {
             Extent::Partial => Vec::new(),
-            _ => self.whole(&guesses),
+            _ => self.whole(),
         };
         if self.settings.extent == Extent::Whole || whole.first().is_some_and(|w| self.believed(w)) {
             return whole;
         }
-        let partial = self.partial(&guesses);
+        let partial = self.partial();
         match (whole.first(), partial.first()) {
             (Some(w), Some(p)) if p.score > w.score + PARTIAL_MARGIN => partial,
             (None, _) => partial,
@@ -141,9 +188,9 @@ impl Search<'_> {
         fit.score > SURELY_WHOLE || (closed && fit.rms < ONE_KIND)
     }
 
-    fn whole(&self, guesses: &[Vec<Rigid>]) -> Vec<Candidate> {
+    fn whole(&self) -> Vec<Candidate> {
         let mut out: Vec<Candidate> = Vec::new();
-        for (source, guesses) in self.sources.iter().zip(guesses) {
+        for (source, guesses) in self.sources.iter().zip(self.guesses) {
             let fits = surface::whole(source, self.target, guesses, self.settings.scale, 4);
             out.extend(fits.into_iter().map(|fit| Candidate {
                 score: both_ways(source, self.target, &fit.pose, usize::MAX, FINE),
@@ -165,10 +212,10 @@ impl Search<'_> {
         out
     }
 
-    fn partial(&self, guesses: &[Vec<Rigid>]) -> Vec<Candidate> {
+    fn partial(&self) -> Vec<Candidate> {
         let s = self.settings;
         let mut out: Vec<Candidate> = Vec::new();
-        for (source, guesses) in self.sources.iter().zip(guesses) {
+        for (source, guesses) in self.sources.iter().zip(self.guesses) {
             let fits = partial::partial(
                 source,
                 self.target,

@@ -1,6 +1,6 @@
-//! First guesses of the pose of whole shapes from their moments.
+//! Moments of points, and the first guesses of a pose that follow from them.
 //!
-//! In: moments of both. Out: rotations, best guesses first, each with the translation that joins the centroids.
+//! In: the moments of both shapes. Out: poses that join the centroids, best guesses first.
 //!
 //! 1. The 24 proper ways to lay one triad of principal axes on the other: the four flips of the usual recipe, and the swaps
 //!    for two persons' bones whose second and third axes change places.
@@ -8,12 +8,51 @@
 //!    patella the axes in its plane mean nothing.
 //! 3. When all three are, the sixty rotations of the icosahedron: nowhere farther than 44.5 degrees from any rotation.
 
-use super::oriented::Moments;
 use crate::geometry::Rigid;
 use glam::{DMat3, DVec3};
+use nalgebra::Matrix3;
 
 /// Deviations whose ratio is below this are taken as equal.
 const NEARLY_EQUAL: f64 = 1.25;
+
+/// First and second moments of points.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Moments {
+    pub(crate) centroid: DVec3,
+    /// Standard deviations along the axes, largest first.
+    pub(crate) deviations: DVec3,
+    /// Principal axes as columns, right-handed.
+    pub(crate) axes: DMat3,
+}
+
+/// Mean, deviations and axes of equally weighted points.
+pub(crate) fn moments(points: &[DVec3]) -> Moments {
+    let n = points.len().max(1) as f64;
+    let centroid = points.iter().copied().sum::<DVec3>() / n;
+    let mut m = Matrix3::<f64>::zeros();
+    for p in points {
+        let d = *p - centroid;
+        for r in 0..3 {
+            for c in 0..3 {
+                m[(r, c)] += d[r] * d[c] / n;
+            }
+        }
+    }
+    let eigen = m.symmetric_eigen();
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    let axis = |k: usize| {
+        let v = eigen.eigenvectors.column(order[k]);
+        DVec3::new(v[0], v[1], v[2])
+    };
+    let deviation = |k: usize| eigen.eigenvalues[order[k]].max(0.0).sqrt();
+    let (x, y) = (axis(0), axis(1));
+    Moments {
+        centroid,
+        deviations: DVec3::new(deviation(0), deviation(1), deviation(2)),
+        axes: DMat3::from_cols(x, y, x.cross(y)),
+    }
+}
 
 /// Poses that bring the moments of `source` onto those of `target`.
 pub(crate) fn from_moments(target: &Moments, source: &Moments) -> Vec<Rigid> {
