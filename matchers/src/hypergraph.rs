@@ -189,7 +189,7 @@ pub struct Curve {
     pub ends: CurveEnds,
     /// Evidence; the price of leaving the curve unmatched.
     pub weight: f64,
-    /// Price of shrinking the curve to a point, so that its ends become one node; `None` forbids it.
+    /// Price of shrinking the curve to a point, so that its ends become one node, incidences included; `None` forbids it.
     pub contract_price: Option<f64>,
     /// Attributes, as many as every other curve has.
     pub attributes: Vec<f64>,

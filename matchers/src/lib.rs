@@ -16,11 +16,13 @@
 //! * [`matching_problem`]: two hypergraphs and their costs as one quadratic objective
 //! * [`assignment`]: the linear sum assignment problem, rectangular, with forbidden pairs and dual bounds
 //! * [`graduated_assignment`]: coupled soft assignments of nodes, curves and sheets; also ordinary graphs
+//! * [`edit_distance`]: the least price of turning one hypergraph into the other, and the path
 //! * [`pose`]: weighted rigid and similarity fits, maximum consistent sets, graduated non-convexity
 //!
 //! Everything is deterministic: no result depends on threads, hash order, the clock or an unseeded generator.
 
 pub mod assignment;
+pub mod edit_distance;
 pub mod graduated_assignment;
 
 pub mod hypergraph;

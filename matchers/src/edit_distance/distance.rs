@@ -1,0 +1,445 @@
+//! The front door: distance, bounds and path.
+//!
+//! In: two hypergraphs, [`GroupCosts`], an [`EditSettings`]. Out: an [`EditDistance`].
+//!
+//! 1. Without heals: graduated assignment gives an upper bound, the branch bound a lower one, and branch and bound closes
+//!    the gap while the graphs are small and the limit lasts.
+//! 2. Heals are added one by one, the best first, as long as one lowers the price.
+//! 3. Small graphs: branch and bound over sets of heals, cheapest heal first. A set of heals costs at least its price plus
+//!    [`super::relaxation`]; where no heal can be added below the best price, step 1 settles the set exactly.
+//! 4. The path is written for the cheapest map found.
+//!
+//! Larger graphs skip step 3; their lower bound is the relaxation over all heals.
+//! Every pair of healed graphs is solved in canonical order, so that the answer is the same to the bit for either
+//! direction and any order of the elements (elements that their surroundings cannot tell apart excepted).
+
+use super::branch_and_bound::{self, RELATIVE_TOLERANCE, SearchResult};
+use super::canonical::Canonical;
+use super::costs::GroupCosts;
+use super::healing::{self, Heal, Healed};
+use super::operations::{Operation, edit_path};
+use super::relaxation::{Touched, relaxed_lower_bound};
+use crate::graduated_assignment::{MatchSettings, match_hypergraphs};
+use crate::hypergraph::{AttributedHypergraph, Kind};
+use crate::matching_problem::{
+    ElementCosts, ElementMap, EvidenceSettings, MatchingProblem, ProblemError, Side,
+};
+use crate::table::Table;
+use serde::{Deserialize, Serialize};
+
+/// How to measure.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EditSettings {
+    /// Strengths of incidences.
+    pub evidence: EvidenceSettings,
+    /// Allow contractions.
+    pub contract: bool,
+    /// Allow merges.
+    pub merge: bool,
+    /// Largest number of nodes and of sheets of either graph for which the distance is proven.
+    pub exact_up_to: usize,
+    /// Most search nodes of one branch and bound over maps.
+    pub max_search_nodes: usize,
+    /// Most sets of heals looked at in the proof.
+    pub max_heal_sets: usize,
+    /// Most heals tried in one round of step 2, cheapest first.
+    pub max_heals_tried: usize,
+    /// How the first map is found.
+    pub matching: MatchSettings,
+}
+
+impl Default for EditSettings {
+    fn default() -> Self {
+        Self {
+            evidence: EvidenceSettings::default(),
+            contract: true,
+            merge: true,
+            exact_up_to: 12,
+            max_search_nodes: 50_000,
+            max_heal_sets: 2_000,
+            max_heals_tried: 48,
+            matching: MatchSettings::default(),
+        }
+    }
+}
+
+/// How far apart two hypergraphs are.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EditDistance {
+    /// No edit path is cheaper, in the weights' unit.
+    pub lower_bound: f64,
+    /// Price of the path given: the distance when `exact`.
+    pub upper_bound: f64,
+    /// Whether the path is proven cheapest (to 1e-10 of the price of removing everything).
+    pub exact: bool,
+    /// `1 - upper_bound / (price of removing everything)`; 1 when both graphs are empty.
+    pub similarity: f64,
+    /// The path: heals, splices, deformations; the prices add up to `upper_bound`.
+    pub operations: Vec<Operation>,
+    /// Search nodes visited over all branch and bounds.
+    pub search_nodes: usize,
+    /// Sets of heals looked at.
+    pub heal_sets: usize,
+}
+
+/// Measures the edit distance.
+///
+/// # Errors
+/// When costs or settings are out of range.
+///
+/// # Complexity
+/// Exponential in the number of nodes and sheets in the worst case, bounded by the limits in the settings.
+///
+/// # Example
+/// ```
+/// use matchers::edit_distance::{EditSettings, edit_distance};
+/// use matchers::matching_problem::AttributeScales;
+/// use matchers::{AttributedHypergraph, CurveEnds, ElementCosts};
+/// let sheet = |area: f64| {
+///     let mut g = AttributedHypergraph::new();
+///     let rib = g.add_curve(CurveEnds::Closed, 3.0, vec![]).unwrap();
+///     g.add_sheet(vec![rib], 3.0, vec![area]).unwrap();
+///     g
+/// };
+/// let (g, h) = (sheet(100.0), sheet(112.0));
+/// let scales = AttributeScales { sheets: vec![0.1], ..Default::default() };
+/// let costs = ElementCosts::from_attributes(&g, &h, &scales).unwrap();
+/// let d = edit_distance(&g, &h, &costs, &EditSettings::default()).unwrap();
+/// assert!(d.exact);
+/// assert!((d.upper_bound - 1.2).abs() < 1e-12); // 12 units of area at 0.1
+/// ```
+pub fn edit_distance(
+    target: &AttributedHypergraph,
+    source: &AttributedHypergraph,
+    costs: &dyn GroupCosts,
+    settings: &EditSettings,
+) -> Result<EditDistance, ProblemError> {
+    let model = Model::new(target, source, costs, settings)?;
+    let mut best = model
+        .solve(&Heals::default(), true)?
+        .expect("no heals do not contradict each other");
+    let mut lower_bound = best.found.lower_bound;
+    let mut exact = best.found.exact;
+    let mut proof = Proof {
+        heal_sets: 1,
+        search_nodes: best.found.search_nodes,
+        open: f64::INFINITY,
+    };
+    if settings.contract || settings.merge {
+        model.heal_greedily(&mut best, &mut proof)?;
+        if model.small() {
+            model.prove(&mut best, &mut proof)?;
+            lower_bound = proof.open.min(best.price);
+            exact = lower_bound >= best.price - model.tolerance;
+        } else {
+            lower_bound = model
+                .relaxed(&Heals::default(), 0, best.price)?
+                .unwrap_or(0.0)
+                .min(best.price);
+            exact = lower_bound >= best.price - model.tolerance;
+        }
+    }
+    let problem = model.problem(&best.target, &best.source)?;
+    let operations = edit_path(
+        &problem,
+        &best.found.map,
+        (&best.target, &best.heals.target),
+        (&best.source, &best.heals.source),
+    );
+    let total = model.total;
+    Ok(EditDistance {
+        lower_bound: if exact { best.price } else { lower_bound.max(0.0) },
+        upper_bound: best.price,
+        exact,
+        similarity: if total > 0.0 {
+            1.0 - best.price / total
+        } else {
+            1.0
+        },
+        operations,
+        search_nodes: proof.search_nodes,
+        heal_sets: proof.heal_sets,
+    })
+}
+
+/// Heals applied to either side, each list cheapest first.
+#[derive(Debug, Clone, Default)]
+struct Heals {
+    target: Vec<Heal>,
+    source: Vec<Heal>,
+}
+
+/// A set of heals and the cheapest map found for it.
+struct Solution {
+    heals: Heals,
+    target: Healed,
+    source: Healed,
+    found: SearchResult,
+    /// Price of the heals and the map.
+    price: f64,
+}
+
+/// What the proof has spent, and the least lower bound of what it left open.
+struct Proof {
+    heal_sets: usize,
+    search_nodes: usize,
+    open: f64,
+}
+
+/// A heal that may be applied, and to which side.
+#[derive(Clone)]
+struct Candidate {
+    on_target: bool,
+    heal: Heal,
+}
+
+struct Model<'a> {
+    target: &'a AttributedHypergraph,
+    source: &'a AttributedHypergraph,
+    costs: &'a dyn GroupCosts,
+    settings: &'a EditSettings,
+    /// All heals of both sides, cheapest first.
+    candidates: Vec<Candidate>,
+    total: f64,
+    tolerance: f64,
+}
+
+impl<'a> Model<'a> {
+    fn new(
+        target: &'a AttributedHypergraph,
+        source: &'a AttributedHypergraph,
+        costs: &'a dyn GroupCosts,
+        settings: &'a EditSettings,
+    ) -> Result<Self, ProblemError> {
+        let sides = [target, source].map(|g| Side::new(g, &settings.evidence));
+        let mut candidates = Vec::new();
+        for (side, on_target) in [(0, true), (1, false)] {
+            let g = [target, source][side];
+            let list = healing::candidates(g, &sides[side], settings.contract, settings.merge);
+            candidates.extend(list.into_iter().map(|heal| Candidate { on_target, heal }));
+        }
+        candidates.sort_by(|a, b| a.heal.price.total_cmp(&b.heal.price));
+        let total = sides[0].total() + sides[1].total();
+        let tolerance = RELATIVE_TOLERANCE * total;
+        Ok(Self {
+            target,
+            source,
+            costs,
+            settings,
+            candidates,
+            total,
+            tolerance,
+        })
+    }
+
+    /// Whether the distance is to be proven.
+    fn small(&self) -> bool {
+        let most = self.settings.exact_up_to;
+        [self.target, self.source]
+            .iter()
+            .all(|g| g.nodes().len() <= most && g.sheets().len() <= most)
+    }
+
+    fn problem(&self, target: &Healed, source: &Healed) -> Result<MatchingProblem, ProblemError> {
+        let table = |kind: Kind| {
+            let (t, s) = (&target.parts[kind.index()], &source.parts[kind.index()]);
+            Table::from_fn(t.len(), s.len(), |r, c| self.costs.cost(kind, &t[r], &s[c]))
+        };
+        let costs = ElementCosts {
+            nodes: table(Kind::Node),
+            curves: table(Kind::Curve),
+            sheets: table(Kind::Sheet),
+        };
+        MatchingProblem::new(&target.graph, &source.graph, &costs, &self.settings.evidence)
+    }
+
+    fn apply(&self, heals: &Heals) -> Option<(Healed, Healed)> {
+        Some((
+            healing::apply(self.target, &heals.target)?,
+            healing::apply(self.source, &heals.source)?,
+        ))
+    }
+
+    /// The cheapest map for a set of heals; exactly when asked for and small. `None` when heals contradict each other.
+    fn solve(&self, heals: &Heals, exactly: bool) -> Result<Option<Solution>, ProblemError> {
+        let Some((target, source)) = self.apply(heals) else {
+            return Ok(None);
+        };
+        let canonical = Canonical::new(&self.problem(&target, &source)?);
+        let problem = &canonical.problem;
+        let first = match_hypergraphs(problem, &[], &self.settings.matching);
+        let mut found = if exactly && self.small() {
+            branch_and_bound::search(problem, &first.map, self.settings.max_search_nodes)
+        } else {
+            let lower_bound = branch_and_bound::root_lower_bound(problem).min(first.price);
+            let exact = lower_bound >= first.price - self.tolerance;
+            SearchResult {
+                upper_bound: first.price,
+                lower_bound,
+                exact,
+                map: first.map,
+                search_nodes: 0,
+            }
+        };
+        found.map = canonical.export(&found.map);
+        let price = target.price + source.price + found.upper_bound;
+        Ok(Some(Solution {
+            heals: heals.clone(),
+            target,
+            source,
+            found,
+            price,
+        }))
+    }
+
+    fn with(&self, heals: &Heals, candidate: &Candidate) -> Heals {
+        let mut more = heals.clone();
+        let list = if candidate.on_target {
+            &mut more.target
+        } else {
+            &mut more.source
+        };
+        list.push(candidate.heal);
+        list.sort_by(|a, b| a.price.total_cmp(&b.price));
+        more
+    }
+
+    /// Adds the heal that lowers the price most, until none does.
+    fn heal_greedily(&self, best: &mut Solution, proof: &mut Proof) -> Result<(), ProblemError> {
+        loop {
+            let mut better: Option<Solution> = None;
+            let affordable = self.candidates.iter().take_while(|c| c.heal.price < best.price);
+            for candidate in affordable.take(self.settings.max_heals_tried) {
+                let Some(next) = self.solve(&self.with(&best.heals, candidate), false)? else {
+                    continue;
+                };
+                proof.heal_sets += 1;
+                let least = better.as_ref().map_or(best.price, |b| b.price);
+                if next.price < least - self.tolerance {
+                    better = Some(next);
+                }
+            }
+            match better {
+                Some(next) => *best = next,
+                None => return Ok(()),
+            }
+        }
+    }
+
+    /// Lower bound over a set of heals and all its supersets by candidates from `next` on that stay below `cutoff`.
+    fn relaxed(&self, heals: &Heals, next: usize, cutoff: f64) -> Result<Option<f64>, ProblemError> {
+        let Some((target, source)) = self.apply(heals) else {
+            return Ok(None);
+        };
+        let price = target.price + source.price;
+        let problem = self.problem(&target, &source)?;
+        let touched = |healed: &Healed, g: &AttributedHypergraph, on_target: bool| {
+            let mut place = Kind::ALL.map(|k| vec![None; g.count(k)]);
+            for k in 0..3 {
+                for (at, parts) in healed.parts[k].iter().enumerate() {
+                    parts.iter().for_each(|&x| place[k][x as usize] = Some(at as u32));
+                }
+            }
+            let open = self.candidates[next..]
+                .iter()
+                .filter(|c| c.on_target == on_target);
+            let open = open.map(|c| &c.heal).filter(|h| price + h.price < cutoff);
+            Touched::new([0, 1, 2].map(|k| healed.parts[k].len()), &place, open)
+        };
+        let (t, s) = (
+            touched(&target, self.target, true),
+            touched(&source, self.source, false),
+        );
+        Ok(Some(price + relaxed_lower_bound(&problem, &t, &s)))
+    }
+
+    fn prove(&self, best: &mut Solution, proof: &mut Proof) -> Result<(), ProblemError> {
+        let limit = proof.heal_sets + self.settings.max_heal_sets;
+        self.expand(&Heals::default(), 0.0, 0, limit, best, proof)
+    }
+
+    /// Settles a set of heals and its supersets by candidates from `next` on.
+    fn expand(
+        &self,
+        heals: &Heals,
+        price: f64,
+        next: usize,
+        limit: usize,
+        best: &mut Solution,
+        proof: &mut Proof,
+    ) -> Result<(), ProblemError> {
+        let Some(bound) = self.relaxed(heals, next, best.price)? else {
+            return Ok(());
+        };
+        if bound >= best.price - self.tolerance {
+            return Ok(());
+        }
+        proof.heal_sets += 1;
+        if proof.heal_sets > limit {
+            proof.open = proof.open.min(bound);
+            return Ok(());
+        }
+        let candidate = self
+            .candidates
+            .get(next)
+            .filter(|c| price + c.heal.price < best.price - self.tolerance);
+        let Some(candidate) = candidate else {
+            let Some(settled) = self.solve(heals, true)? else {
+                return Ok(());
+            };
+            proof.search_nodes += settled.found.search_nodes;
+            if !settled.found.exact {
+                proof.open = proof.open.min(price + settled.found.lower_bound);
+            }
+            if settled.price < best.price - self.tolerance {
+                *best = settled;
+            }
+            return Ok(());
+        };
+        self.expand(
+            &self.with(heals, candidate),
+            price + candidate.heal.price,
+            next + 1,
+            limit,
+            best,
+            proof,
+        )?;
+        self.expand(heals, price, next + 1, limit, best, proof)
+    }
+}
+
+/// The map from target to source in original elements: heaviest parts of matched elements.
+impl EditDistance {
+    /// Pairs (target, source) of the heaviest parts of deformed elements of a kind, by target.
+    pub fn correspondences(&self, kind: Kind) -> Vec<(u32, u32)> {
+        let mut pairs: Vec<(u32, u32)> = self
+            .operations
+            .iter()
+            .filter_map(|o| match o {
+                Operation::Deform {
+                    kind: k,
+                    target,
+                    source,
+                    ..
+                } if *k == kind => Some((target[0], source[0])),
+                _ => None,
+            })
+            .collect();
+        pairs.sort_unstable();
+        pairs
+    }
+
+    /// The same as a map.
+    pub fn map(&self, target: &AttributedHypergraph) -> ElementMap {
+        let list = |kind: Kind| {
+            let mut map = vec![None; target.count(kind)];
+            self.correspondences(kind)
+                .into_iter()
+                .for_each(|(x, y)| map[x as usize] = Some(y));
+            map
+        };
+        ElementMap {
+            source_of_target: Kind::ALL.map(list),
+        }
+    }
+}

@@ -1,0 +1,33 @@
+//! Edit distance of hypergraphs: the least price of turning one into the other, with the path that costs it.
+//!
+//! Operations, all priced in the unit of the weights:
+//!
+//! * **deform** an element into one of the other graph: its cost, and what its incidences change by;
+//! * **splice** an element away (from either graph): its weight, and its incidences;
+//! * **contract** a curve, so that its two end nodes become one;
+//! * **merge** two curves across a node, or two sheets across a curve, which goes.
+//!
+//! With deform and splice alone the distance is a pseudo-metric whenever the costs are metric and respect the weights
+//! ([`crate::matching_problem`]). With contract and merge it is symmetric and zero for equal graphs, and obeys the
+//! triangle inequality up to what a healed element can differ from its parts.
+//!
+//! * [`costs`]: deformation costs of single and healed elements
+//! * [`canonical`]: an order that does not depend on how graphs were stored
+//! * [`branch_and_bound`]: exact search and the branch lower bound, for fixed graphs
+//! * [`healing`]: contract and merge
+//! * [`relaxation`]: a lower bound that holds for all heals
+//! * [`operations`]: the edit path
+//! * [`distance`]: the front door
+
+pub mod branch_and_bound;
+pub mod canonical;
+pub mod costs;
+pub mod distance;
+pub mod healing;
+pub mod operations;
+pub mod relaxation;
+
+pub use costs::{AttributeCosts, GroupCosts, MergeRule, MergeRules};
+pub use distance::{EditDistance, EditSettings, edit_distance};
+pub use healing::Heal;
+pub use operations::{GraphSide, Operation};

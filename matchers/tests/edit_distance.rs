@@ -1,0 +1,502 @@
+//! Edit distance: exhaustive search, bounds, metric properties, heals, and the path's arithmetic.
+
+mod common;
+
+use common::{permuted, problem_of, random_hypergraph, settings_scales};
+use matchers::assignment;
+use matchers::edit_distance::branch_and_bound::{root_lower_bound, search};
+use matchers::edit_distance::healing::{apply, candidates};
+use matchers::edit_distance::{EditDistance, EditSettings, GroupCosts, Operation, edit_distance};
+use matchers::graduated_assignment::{MatchSettings, match_hypergraphs};
+use matchers::hypergraph::Kind;
+use matchers::matching_problem::{ElementMap, Side};
+use matchers::{
+    AttributedHypergraph, CurveEnds, ElementCosts, EvidenceSettings, MatchingProblem, NodeId, Table,
+};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+fn plain() -> EditSettings {
+    EditSettings {
+        contract: false,
+        merge: false,
+        ..EditSettings::default()
+    }
+}
+
+fn distance_with(
+    g: &AttributedHypergraph,
+    h: &AttributedHypergraph,
+    settings: &EditSettings,
+) -> EditDistance {
+    let costs = ElementCosts::from_attributes(g, h, &settings_scales()).unwrap();
+    edit_distance(g, h, &costs, settings).unwrap()
+}
+
+/// All partial one-to-one maps of n to m elements.
+fn partial_maps(n: usize, m: usize) -> Vec<Vec<Option<u32>>> {
+    let mut all = vec![Vec::new()];
+    for _ in 0..n {
+        let mut longer = Vec::new();
+        for map in all {
+            for y in std::iter::once(None).chain((0..m as u32).map(Some)) {
+                if y.is_none() || !map.contains(&y) {
+                    let mut next: Vec<Option<u32>> = map.clone();
+                    next.push(y);
+                    longer.push(next);
+                }
+            }
+        }
+        all = longer;
+    }
+    all
+}
+
+/// Cheapest price over all maps, from the definition of the price alone.
+fn exhaustive(problem: &MatchingProblem) -> f64 {
+    let maps = [0, 1, 2].map(|k| partial_maps(problem.target.count(k), problem.source.count(k)));
+    let mut best = f64::INFINITY;
+    let mut map = ElementMap::empty(problem);
+    for nodes in &maps[0] {
+        map.source_of_target[0].clone_from(nodes);
+        for sheets in &maps[2] {
+            map.source_of_target[2].clone_from(sheets);
+            for curves in &maps[1] {
+                map.source_of_target[1].clone_from(curves);
+                best = best.min(problem.price(&map));
+            }
+        }
+    }
+    best
+}
+
+#[test]
+fn branch_and_bound_equals_exhaustive_search_on_hypergraphs() {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    for trial in 0..40 {
+        let sizes = |rng: &mut ChaCha8Rng| {
+            [
+                rng.random_range(0..4),
+                rng.random_range(0..5),
+                rng.random_range(0..3),
+            ]
+        };
+        let (a, b) = (sizes(&mut rng), sizes(&mut rng));
+        let g = random_hypergraph(&mut rng, a[0], a[1], a[2]);
+        let h = random_hypergraph(&mut rng, b[0], b[1], b[2]);
+        let problem = problem_of(&g, &h);
+        let truth = exhaustive(&problem);
+        let scale = problem.total().max(1.0);
+        assert!(
+            root_lower_bound(&problem) <= truth + 1e-9 * scale,
+            "trial {trial}"
+        );
+        // Started from nothing, so that the search does the work.
+        let found = search(&problem, &ElementMap::empty(&problem), 1_000_000);
+        assert!(found.exact);
+        assert!(
+            (found.upper_bound - truth).abs() < 1e-9 * scale,
+            "trial {trial}: {} {truth}",
+            found.upper_bound
+        );
+        let d = distance_with(&g, &h, &plain());
+        assert!(
+            d.exact && (d.upper_bound - truth).abs() < 1e-9 * scale,
+            "trial {trial}"
+        );
+    }
+}
+
+/// Ordinary graphs by edge set; all graphs of n nodes that differ by more than their numbering.
+fn all_graphs(n: usize) -> Vec<Vec<(u32, u32)>> {
+    let pairs: Vec<(u32, u32)> = (0..n as u32).flat_map(|a| (0..a).map(move |b| (b, a))).collect();
+    let mut orders = vec![Vec::new()];
+    for _ in 0..n {
+        orders = orders
+            .into_iter()
+            .flat_map(|o: Vec<u32>| {
+                (0..n as u32)
+                    .filter(|v| !o.contains(v))
+                    .map(|v| [o.clone(), vec![v]].concat())
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+    }
+    let mut canonical = std::collections::BTreeSet::new();
+    let mut graphs = Vec::new();
+    for mask in 0..1u32 << pairs.len() {
+        let edges: Vec<(u32, u32)> = pairs
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| mask >> k & 1 == 1)
+            .map(|(_, e)| *e)
+            .collect();
+        let renumbered = |o: &Vec<u32>| {
+            let bit = |&(a, b): &(u32, u32)| {
+                let (a, b) = (o[a as usize], o[b as usize]);
+                pairs
+                    .iter()
+                    .position(|&p| p == (a.min(b), a.max(b)))
+                    .expect("a pair")
+            };
+            edges.iter().map(|e| 1u32 << bit(e)).sum::<u32>()
+        };
+        let least = orders.iter().map(renumbered).min().expect("there is an order");
+        if canonical.insert(least) {
+            graphs.push(edges);
+        }
+    }
+    graphs
+}
+
+fn ordinary(n: usize, edges: &[(u32, u32)]) -> AttributedHypergraph {
+    let mut g = AttributedHypergraph::new();
+    (0..n).for_each(|_| {
+        g.add_node(1.0, vec![]).unwrap();
+    });
+    for &(a, b) in edges {
+        g.add_curve(CurveEnds::Two(NodeId(a), NodeId(b)), 1.0, vec![])
+            .unwrap();
+    }
+    g
+}
+
+/// Edit distance by trying all node maps; with the nodes fixed, curves are independent of one another, and the best
+/// partial assignment of curves is an LSAP, which tests/assignment.rs checks against brute force.
+fn exhaustive_ordinary(problem: &MatchingProblem, maps: &[Vec<Option<u32>>]) -> f64 {
+    let (n, m) = (problem.target.count(1), problem.source.count(1));
+    let mut best = f64::INFINITY;
+    for map in maps {
+        let strength =
+            |side: &Side, node: u32, curve: usize| side.incidences[0].strength(node as usize, curve);
+        let pairs: Vec<(u32, u32)> = map
+            .iter()
+            .enumerate()
+            .filter_map(|(x, y)| y.map(|y| (x as u32, y)))
+            .collect();
+        let gain = |e: usize, f: usize| {
+            2.0 + pairs
+                .iter()
+                .map(|&(x, y)| 2.0 * strength(&problem.target, x, e).min(strength(&problem.source, y, f)))
+                .sum::<f64>()
+        };
+        let table = Table::from_fn(n, m, gain);
+        let curves = -assignment::solve_max(&table).unwrap().cost;
+        best = best.min(problem.total() - 2.0 * pairs.len() as f64 - curves);
+    }
+    best
+}
+
+/// Every pair of graphs of at most `n` nodes, all weights one: nothing but structure, the hardest case for bounds.
+fn check_all_pairs(most: usize) {
+    let graphs: Vec<(usize, Vec<(u32, u32)>)> = (0..=most)
+        .flat_map(|n| all_graphs(n).into_iter().map(move |e| (n, e)))
+        .collect();
+    let maps: Vec<Vec<_>> = (0..=most)
+        .map(|n| (0..=most).map(|m| partial_maps(n, m)).collect())
+        .collect();
+    for (k, (n, te)) in graphs.iter().enumerate() {
+        for (m, se) in &graphs[..=k] {
+            let (g, h) = (ordinary(*n, te), ordinary(*m, se));
+            let zero = |kind| Table::zeros(g.count(kind), h.count(kind));
+            let costs = ElementCosts {
+                nodes: zero(Kind::Node),
+                curves: zero(Kind::Curve),
+                sheets: zero(Kind::Sheet),
+            };
+            let problem = MatchingProblem::new(&g, &h, &costs, &EvidenceSettings::default()).unwrap();
+            let truth = exhaustive_ordinary(&problem, &maps[*n][*m]);
+            let d = edit_distance(&g, &h, &costs, &plain()).unwrap();
+            assert!(d.exact, "{te:?} {se:?}");
+            assert!(
+                (d.upper_bound - truth).abs() < 1e-9,
+                "{te:?} {se:?}: {} {truth}",
+                d.upper_bound
+            );
+            assert!(root_lower_bound(&problem) <= truth + 1e-9);
+        }
+    }
+}
+
+/// MEDIAL_SLOW=1 goes to 6 nodes (208 graphs, 21 736 pairs).
+#[test]
+fn equals_exhaustive_search_on_all_pairs_of_small_graphs() {
+    check_all_pairs(if std::env::var_os("MEDIAL_SLOW").is_some() {
+        6
+    } else {
+        4
+    });
+}
+
+#[test]
+fn distance_to_itself_is_zero_in_any_order() {
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    for _ in 0..20 {
+        let g = random_hypergraph(&mut rng, 9, 13, 5);
+        let (h, places) = permuted(&g, &mut rng);
+        let d = distance_with(&g, &h, &EditSettings::default());
+        assert!(d.exact && d.upper_bound < 1e-12 && d.similarity > 1.0 - 1e-12);
+        for kind in Kind::ALL {
+            for (x, y) in d.correspondences(kind) {
+                if kind != Kind::Sheet {
+                    assert_eq!(places[kind.index()][x as usize], y as usize);
+                }
+            }
+        }
+    }
+}
+
+/// The same bits for either direction and any order of the elements, exact or not.
+#[test]
+fn symmetric_and_independent_of_order_to_the_bit() {
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    for trial in 0..12 {
+        let g = random_hypergraph(&mut rng, 6, 8, 3);
+        let h = random_hypergraph(&mut rng, 5, 9, 4);
+        for settings in [
+            plain(),
+            EditSettings {
+                max_heal_sets: 50,
+                ..EditSettings::default()
+            },
+        ] {
+            let d = distance_with(&g, &h, &settings);
+            let back = distance_with(&h, &g, &settings);
+            assert_eq!(
+                d.upper_bound.to_bits(),
+                back.upper_bound.to_bits(),
+                "trial {trial}"
+            );
+            let shuffled = distance_with(&permuted(&g, &mut rng).0, &permuted(&h, &mut rng).0, &settings);
+            assert_eq!(
+                d.upper_bound.to_bits(),
+                shuffled.upper_bound.to_bits(),
+                "trial {trial}"
+            );
+            assert_eq!(d.exact, back.exact);
+        }
+    }
+}
+
+#[test]
+fn bounds_bracket_and_the_path_adds_up() {
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    for _ in 0..10 {
+        let g = random_hypergraph(&mut rng, 8, 12, 4);
+        let h = random_hypergraph(&mut rng, 9, 12, 5);
+        let exact = distance_with(&g, &h, &plain());
+        let hurried = distance_with(
+            &g,
+            &h,
+            &EditSettings {
+                max_search_nodes: 3,
+                ..plain()
+            },
+        );
+        let large = distance_with(
+            &g,
+            &h,
+            &EditSettings {
+                exact_up_to: 0,
+                ..plain()
+            },
+        );
+        for d in [&exact, &hurried, &large] {
+            assert!(d.lower_bound <= d.upper_bound);
+            let sum: f64 = d.operations.iter().map(Operation::price).sum();
+            assert!(
+                (sum - d.upper_bound).abs() < 1e-9 * d.upper_bound.max(1.0),
+                "{sum} {}",
+                d.upper_bound
+            );
+        }
+        assert!(exact.exact);
+        for d in [&hurried, &large] {
+            let eps = 1e-9 * exact.upper_bound;
+            assert!(d.lower_bound <= exact.upper_bound + eps && exact.upper_bound <= d.upper_bound + eps);
+        }
+    }
+}
+
+/// Deform and splice alone make a pseudo-metric.
+#[test]
+fn triangle_inequality_without_heals() {
+    let triples = if std::env::var_os("MEDIAL_SLOW").is_some() {
+        1000
+    } else {
+        100
+    };
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    for trial in 0..triples {
+        let g: Vec<_> = (0..3).map(|_| random_hypergraph(&mut rng, 4, 5, 3)).collect();
+        let d = |a: usize, b: usize| {
+            let d = distance_with(&g[a], &g[b], &plain());
+            assert!(d.exact);
+            d.upper_bound
+        };
+        assert!(d(0, 2) <= d(0, 1) + d(1, 2) + 1e-9, "trial {trial}");
+    }
+}
+
+/// The cheapest over all sets of heals of both sides, every set solved exactly.
+fn exhaustive_heals(g: &AttributedHypergraph, h: &AttributedHypergraph, costs: &ElementCosts) -> f64 {
+    let evidence = EvidenceSettings::default();
+    let sets = |g: &AttributedHypergraph| {
+        let all = candidates(g, &Side::new(g, &evidence), true, true);
+        assert!(all.len() <= 12, "{} heals", all.len());
+        (0..1u32 << all.len())
+            .filter_map(|mask| {
+                let chosen: Vec<_> = (0..all.len())
+                    .filter(|k| mask >> k & 1 == 1)
+                    .map(|k| all[k])
+                    .collect();
+                apply(g, &chosen)
+            })
+            .collect::<Vec<_>>()
+    };
+    let (tg, th) = (sets(g), sets(h));
+    let mut best = f64::INFINITY;
+    for a in &tg {
+        for b in th.iter().filter(|b| a.price + b.price < 1e9) {
+            if a.price + b.price >= best {
+                continue;
+            }
+            let table = |kind: Kind| {
+                let (t, s) = (&a.parts[kind.index()], &b.parts[kind.index()]);
+                Table::from_fn(t.len(), s.len(), |r, c| costs.cost(kind, &t[r], &s[c]))
+            };
+            let healed_costs = ElementCosts {
+                nodes: table(Kind::Node),
+                curves: table(Kind::Curve),
+                sheets: table(Kind::Sheet),
+            };
+            let problem = MatchingProblem::new(&a.graph, &b.graph, &healed_costs, &evidence).unwrap();
+            let first = match_hypergraphs(&problem, &[], &MatchSettings::default());
+            best = best.min(a.price + b.price + search(&problem, &first.map, 1_000_000).upper_bound);
+        }
+    }
+    best
+}
+
+#[test]
+fn the_search_over_heals_equals_exhaustive_search() {
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    let (mut checked, mut healed) = (0, 0);
+    while checked < 15 {
+        let g = random_hypergraph(&mut rng, 3, 3, 2);
+        let h = random_hypergraph(&mut rng, 2, 3, 2);
+        let many = |g: &AttributedHypergraph| {
+            candidates(g, &Side::new(g, &EvidenceSettings::default()), true, true).len() > 7
+        };
+        if many(&g) || many(&h) {
+            continue;
+        }
+        let costs = ElementCosts::from_attributes(&g, &h, &settings_scales()).unwrap();
+        let d = edit_distance(&g, &h, &costs, &EditSettings::default()).unwrap();
+        let truth = exhaustive_heals(&g, &h, &costs);
+        assert!(d.exact);
+        assert!((d.upper_bound - truth).abs() < 1e-9, "{} {truth}", d.upper_bound);
+        let heals = |o: &Operation| matches!(o, Operation::Contract { .. } | Operation::Merge { .. });
+        healed += usize::from(d.operations.iter().any(heals));
+        checked += 1;
+    }
+    assert!(healed > 0, "no case needed a heal");
+}
+
+/// A fin of weight w on a sheet cuts its rib in two: the price of the fin alone, not of the rib.
+#[test]
+fn a_light_fin_costs_its_weight_through_a_merge() {
+    let plate = |fin: Option<f64>| {
+        let mut g = AttributedHypergraph::new();
+        let a = g.add_node(4.0, vec![2.0]).unwrap();
+        let b = g.add_node(4.0, vec![5.0]).unwrap();
+        let other = g.add_curve(CurveEnds::Two(a, b), 6.0, vec![12.0, 1.0]).unwrap();
+        match fin {
+            None => {
+                let rib = g.add_curve(CurveEnds::Two(a, b), 6.0, vec![20.0, 0.5]).unwrap();
+                g.add_sheet(vec![other, rib], 6.0, vec![25.0]).unwrap();
+            }
+            Some(w) => {
+                let at = g.add_node(w, vec![1.0]).unwrap();
+                let tip = g.add_node(w, vec![1.0]).unwrap();
+                let r1 = g.add_curve(CurveEnds::Two(a, at), 6.0, vec![20.0, 0.5]).unwrap();
+                let r2 = g.add_curve(CurveEnds::Two(at, b), 6.0, vec![20.0, 0.5]).unwrap();
+                let axial = g.add_curve(CurveEnds::Two(at, tip), w, vec![3.0, 0.5]).unwrap();
+                let edge = g.add_curve(CurveEnds::Two(at, tip), w, vec![4.0, 0.5]).unwrap();
+                g.add_sheet(vec![other, r1, r2, axial, axial], 6.0, vec![25.0])
+                    .unwrap();
+                g.add_sheet(vec![axial, edge], w, vec![5.0]).unwrap();
+            }
+        }
+        g
+    };
+    let whole = plate(None);
+    for w in [0.2, 0.02, 0.002] {
+        let finned = plate(Some(w));
+        let d = distance_with(&whole, &finned, &EditSettings::default());
+        assert!(d.upper_bound < 15.0 * w, "fin {w}: {}", d.upper_bound);
+        assert!(d.operations.iter().any(|o| matches!(
+            o,
+            Operation::Merge {
+                joined_kind: Kind::Curve,
+                ..
+            }
+        )));
+        let without = distance_with(&whole, &finned, &plain());
+        assert!(
+            without.upper_bound > 5.0,
+            "without merges half of the rib is spliced: {}",
+            without.upper_bound
+        );
+    }
+}
+
+/// A short curve between two nodes: contracting it makes them one.
+#[test]
+fn a_short_curve_is_contracted() {
+    let star = |split: bool| {
+        let mut g = AttributedHypergraph::new();
+        let hub = g.add_node(5.0, vec![3.0]).unwrap();
+        let second = if split {
+            g.add_node(5.0, vec![3.0]).unwrap()
+        } else {
+            hub
+        };
+        if split {
+            let c = g
+                .add_curve(CurveEnds::Two(hub, second), 2.0, vec![0.1, 0.0])
+                .unwrap();
+            g.set_contract_price(c, Some(0.1)).unwrap();
+        }
+        for k in 0..4 {
+            let tip = g.add_node(2.0, vec![f64::from(k)]).unwrap();
+            let from = if k < 2 { hub } else { second };
+            g.add_curve(
+                CurveEnds::Two(from, tip),
+                4.0,
+                vec![5.0 + 3.0 * f64::from(k), 1.0],
+            )
+            .unwrap();
+        }
+        g
+    };
+    let d = distance_with(&star(false), &star(true), &EditSettings::default());
+    assert!(d.exact);
+    assert!((d.upper_bound - 0.1).abs() < 1e-9, "{}", d.upper_bound);
+    assert!(
+        d.operations
+            .iter()
+            .any(|o| matches!(o, Operation::Contract { .. }))
+    );
+}
+
+#[test]
+fn empty_graphs() {
+    let empty = AttributedHypergraph::new();
+    let d = distance_with(&empty, &empty, &EditSettings::default());
+    assert!(d.exact && d.upper_bound == 0.0 && d.similarity == 1.0 && d.operations.is_empty());
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let g = random_hypergraph(&mut rng, 4, 4, 2);
+    let d = distance_with(&g, &empty, &plain());
+    assert!(d.exact && d.similarity.abs() < 1e-12);
+}
