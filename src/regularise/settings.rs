@@ -55,7 +55,7 @@ impl Default for RegulariseSettings {
             collapse: 0.5,
             splice: 1.0,
             grow_back: 0.15,
-            grow_back_axial: 0.5,
+            grow_back_axial: 0.3,
             rounds: 3,
             wire: 1.15,
             seam_radius: 5.0,

@@ -13,7 +13,7 @@ use super::measure::{Measure, Tolerance};
 use super::seams::find_seams;
 use super::settings::{Cost, RegulariseError, RegulariseSettings};
 use super::splice::Splicer;
-use super::wires::remove_small_wires;
+use super::wires::{remove_small_wires, remove_whiskers};
 use crate::fine_scaffold::{Betti, FineScaffold};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -216,7 +216,13 @@ impl<'a> Run<'a> {
     }
 
     /// Growth, then the last small remnants.
-    fn grow(&mut self, cover: &Cover) {
+    fn grow(&mut self, cover: &Cover, clear_whiskers: bool) {
+        if clear_whiskers {
+            let longest = 2.0 * self.settings.seam_length;
+            self.stage(Kind::PruneWires, |run| {
+                remove_whiskers(&mut run.complex, &run.measure, longest);
+            });
+        }
         let (least, least_axial) = (self.settings.grow_back, self.settings.grow_back_axial);
         self.stage(Kind::GrowBack, |run| {
             grow_sheets(&mut run.complex, &run.relative, least, least_axial);
@@ -247,7 +253,7 @@ impl<'a> Run<'a> {
             let start = (self.complex.log.len(), self.history.len());
             let fire = self.fire.clone();
             if attempt < ATTEMPTS {
-                self.grow(cover);
+                self.grow(cover, attempt == 0);
             }
             let distances = fidelity::distances(&self.complex, cover);
             let bad = offending(&distances);
@@ -261,7 +267,7 @@ impl<'a> Run<'a> {
                 fidelity::restore(&mut run.complex, cover, &bad);
             });
         }
-        self.grow(cover);
+        self.grow(cover, false);
         fidelity::distances(&self.complex, cover)
     }
 

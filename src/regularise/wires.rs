@@ -4,6 +4,8 @@ use super::complex::Complex;
 use super::cover::Cover;
 use super::history::{Event, Kind};
 use super::measure::Measure;
+use crate::fine_scaffold::complex::NONE;
+use crate::geometry::mesh::DisjointSets;
 
 /// Removes each wire between a tip and the next junction when the surface moves by no more than `limit` tolerances without
 /// it, the shortest first. Returns the number of wires removed.
@@ -50,6 +52,58 @@ pub(crate) fn remove_small_wires(
             complex.log.len(),
         ));
         removed += 1;
+    }
+    removed
+}
+
+/// Removes the whiskers: dangling wires on the borders of sheets, left over where a facet went through one of several free
+/// edges or where sheets went before their corner. They would keep the sheets from growing back. A whisker is a tree of wire
+/// edges that hangs on a facet and is no longer than `longest` tolerances in all. Returns the number of edges removed.
+pub(crate) fn remove_whiskers(complex: &mut Complex, measure: &Measure, longest: f64) -> usize {
+    let fine = complex.fine;
+    let is_wire = |e: u32| complex.edge_alive[e as usize] && complex.edge_count[e as usize] == 0;
+    let wires: Vec<u32> = (0..fine.num_edges() as u32).filter(|&e| is_wire(e)).collect();
+    let holds_facet = |v: u32| {
+        fine.edges_of_vertex(v as usize)
+            .any(|e| complex.edge_alive[e as usize] && complex.edge_count[e as usize] > 0)
+    };
+    let mut place = vec![NONE; fine.num_vertices()];
+    let mut trees = DisjointSets::new(wires.len());
+    let mut hangs = vec![false; wires.len()];
+    for (i, &e) in wires.iter().enumerate() {
+        for v in fine.edge_vertices[e as usize] {
+            if holds_facet(v) {
+                hangs[i] = true;
+            } else if place[v as usize] == NONE {
+                place[v as usize] = i as u32;
+            } else {
+                trees.union(place[v as usize], i as u32);
+            }
+        }
+    }
+    let mut length = vec![0.0; wires.len()];
+    let mut on_sheet = vec![false; wires.len()];
+    for (i, &e) in wires.iter().enumerate() {
+        let root = trees.find(i as u32) as usize;
+        let [a, b] = fine.edge_vertices[e as usize].map(|v| fine.vertex_position[v as usize]);
+        length[root] += a.distance(b);
+        on_sheet[root] |= hangs[i];
+    }
+    let mut whisker = vec![false; fine.num_edges()];
+    for (i, &e) in wires.iter().enumerate() {
+        let root = trees.find(i as u32) as usize;
+        let tau = measure.tolerance.at(measure.edge_radius[e as usize]);
+        whisker[e as usize] = on_sheet[root] && length[root] <= longest * tau;
+    }
+    let mut removed = 0;
+    for tip in 0..fine.num_vertices() as u32 {
+        let mut at = tip;
+        while let Some(edge) = complex.wire_at_tip(at).filter(|&e| whisker[e as usize]) {
+            let next = fine.other_end(edge as usize, at);
+            complex.remove_edge(edge, at);
+            removed += 1;
+            at = next;
+        }
     }
     removed
 }
