@@ -49,29 +49,34 @@ pub(crate) fn grow_sheets(complex: &mut Complex, relative: &[f64], least: f64, l
     added
 }
 
-/// Whether the alive part of a dead facet's ring is one arc that it may grow from.
+/// Whether the alive part of a dead facet's ring is one arc that it may grow from: of ribs, and of manifold edges only in one
+/// run that goes on from the end of an axial curve.
 fn fits(complex: &Complex, axial: &[u8], facet: u32, may_lengthen: bool) -> bool {
-    let ring = complex.fine.facet_edges(facet as usize);
-    let mut lengthens = 0;
-    for &e in ring {
-        if !complex.edge_alive[e as usize] {
-            continue;
+    let edges = complex.fine.facet_edges(facet as usize);
+    let vertices = complex.fine.facet_vertices(facet as usize);
+    let n = edges.len();
+    let count = |k: usize| {
+        let e = edges[k % n] as usize;
+        if complex.edge_alive[e] {
+            complex.edge_count[e]
+        } else {
+            u8::MAX
         }
-        match complex.edge_count[e as usize] {
-            1 => {}
-            2 if may_lengthen => {
-                let at_end = complex.fine.edge_vertices[e as usize]
-                    .iter()
-                    .any(|&v| axial[v as usize] == 1);
-                if !at_end {
-                    return false;
-                }
-                lengthens += 1;
+    };
+    let (mut runs, mut at_end) = (0, false);
+    for k in 0..n {
+        match count(k) {
+            1 | u8::MAX => {}
+            2 => {
+                let (first, last) = (count(k + n - 1) != 2, count(k + 1) != 2);
+                runs += u32::from(first);
+                at_end |= first && axial[vertices[k] as usize] == 1;
+                at_end |= last && axial[vertices[(k + 1) % n] as usize] == 1;
             }
             _ => return false,
         }
     }
-    lengthens <= 1 && alive_part_is_arc(complex, facet)
+    (runs == 0 || (runs == 1 && at_end && may_lengthen)) && alive_part_is_arc(complex, facet)
 }
 
 /// Whether the alive edges and vertices of a facet's ring form one arc of at least one edge that is not the whole ring.
