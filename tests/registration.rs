@@ -4,7 +4,7 @@ use glam::{DMat3, DVec3};
 use medial_scaffold::geometry::{Rigid, TriangleMesh};
 use medial_scaffold::registration::{
     Method, Mirror, Registration, RegistrationError, RegistrationSettings, RegistrationShape, Surface,
-    register,
+    difference, register,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -364,4 +364,47 @@ fn degenerate_clouds_end_without_a_panic() {
         let found = register(&shape, &shape, &settings).expect("finite points");
         assert!(found.T_target_source.linear.is_finite());
     }
+}
+
+#[test]
+fn the_difference_of_a_shape_and_its_offset_is_the_offset() {
+    let sphere = star(|_| 10.0);
+    let larger = star(|_| 10.5);
+    let motion = motion(9);
+    let d = difference(&sphere, &moved(&larger, &motion), &motion.inverse(), None).expect("sound meshes");
+    assert!(
+        d.at_source
+            .iter()
+            .chain(&d.at_target)
+            .all(|x| (x - 0.5).abs() < 0.02)
+    );
+    assert!((d.hausdorff - 0.5).abs() < 0.02 && (d.assd - 0.5).abs() < 0.02 && (d.hd95 - 0.5).abs() < 0.02);
+    let growth = 100.0 * (1.05f64.powi(3) - 1.0);
+    assert!((d.volume_change_percent.expect("closed") - growth).abs() < 1e-6);
+    assert!((d.area_change_percent - 100.0 * (1.05f64.powi(2) - 1.0)).abs() < 1e-6);
+    // The other way round the signs turn.
+    let d = difference(&larger, &sphere, &Rigid::IDENTITY, None).expect("sound meshes");
+    assert!(
+        d.at_source
+            .iter()
+            .chain(&d.at_target)
+            .all(|x| (x + 0.5).abs() < 0.02)
+    );
+    // A mirrored pose keeps inside and outside apart.
+    let mirror = Rigid {
+        linear: DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0)),
+        translation: DVec3::ZERO,
+    };
+    let d = difference(&sphere, &larger, &mirror, None).expect("sound meshes");
+    assert!(
+        d.at_source
+            .iter()
+            .chain(&d.at_target)
+            .all(|x| (x - 0.5).abs() < 0.02)
+    );
+    // Without a last triangle there is no volume.
+    let mut open = larger.clone();
+    open.triangles.pop();
+    let d = difference(&sphere, &open, &Rigid::IDENTITY, None).expect("sound meshes");
+    assert!(d.volume_source.is_none() && d.volume_change_percent.is_none() && d.volume_target.is_some());
 }

@@ -16,11 +16,13 @@
 //! | `partial`, `pairs` | partial shapes |
 //! | `score`, `refine`, `solve` | shared by both: free space, closest points, one linear step |
 //! | `verdict` | which pose is reported and what is said of it |
+//! | [`difference`](mod@difference) | what is left between the shapes in that pose |
 //!
 //! Everything is seeded; parallel parts keep their order, so results are equal for any number of threads.
 
 mod cells;
 mod denoise;
+pub mod difference;
 mod exact;
 mod nearest_grid;
 mod oriented;
@@ -35,6 +37,7 @@ mod solve;
 mod surface;
 mod verdict;
 
+pub use difference::{Difference, SheetContext, SheetDifference, difference};
 pub use result::{Conditioning, Hypothesis, Method, Registration, SlidingDirection};
 pub use settings::{Extent, Mirror, RegistrationSettings};
 pub use shape::{RegistrationError, RegistrationShape, Surface};

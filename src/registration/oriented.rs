@@ -232,7 +232,8 @@ pub(crate) fn shuffled(n: usize, rng: &mut ChaCha8Rng) -> Vec<u32> {
     order
 }
 
-fn sample(
+/// Points spread by area with their normals, in random order.
+pub(crate) fn sample(
     mesh: &TriangleMesh,
     vertex_normals: &[DVec3],
     count: usize,
