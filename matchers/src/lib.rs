@@ -14,6 +14,7 @@
 //! * [`table`]: dense row-major numbers, one row an element of the target, one column an element of the source
 //! * [`hypergraph`]: nodes, curves (loops and parallel curves allowed), sheets, corners, weights, attributes
 //! * [`matching_problem`]: two hypergraphs and their costs as one quadratic objective
+//! * [`canonical`]: an order of elements that does not depend on how the graphs were stored
 //! * [`assignment`]: the linear sum assignment problem, rectangular, with forbidden pairs and dual bounds
 //! * [`graduated_assignment`]: coupled soft assignments of nodes, curves and sheets; also ordinary graphs
 //! * [`edit_distance`]: the least price of turning one hypergraph into the other, and the path
@@ -22,6 +23,7 @@
 //! Everything is deterministic: no result depends on threads, hash order, the clock or an unseeded generator.
 
 pub mod assignment;
+pub mod canonical;
 pub mod edit_distance;
 pub mod graduated_assignment;
 

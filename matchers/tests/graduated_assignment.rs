@@ -184,3 +184,49 @@ fn empty_graphs_are_equal_and_everything_is_spliced_against_them() {
     assert!((all.price - problem.total()).abs() < 1e-9);
     assert!(all.similarity.abs() < 1e-12);
 }
+
+/// The same bits for either direction and any order of the elements; the same pairs, carried along.
+#[test]
+fn symmetric_and_independent_of_order_to_the_bit() {
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    for _ in 0..15 {
+        let g = random_hypergraph(&mut rng, 9, 14, 5);
+        let h = random_hypergraph(&mut rng, 8, 12, 6);
+        let settings = MatchSettings {
+            kicks: 3,
+            ..MatchSettings::default()
+        };
+        let there = match_hypergraphs(&problem_of(&g, &h), &[], &settings);
+        let back = match_hypergraphs(&problem_of(&h, &g), &[], &settings);
+        assert_eq!(there.price.to_bits(), back.price.to_bits());
+        for (a, b) in [
+            (&there.nodes, &back.nodes),
+            (&there.curves, &back.curves),
+            (&there.sheets, &back.sheets),
+        ] {
+            let mut turned: Vec<_> = b
+                .iter()
+                .map(|p| (p.source, p.target, p.confidence.to_bits()))
+                .collect();
+            turned.sort_unstable();
+            assert_eq!(
+                a.iter()
+                    .map(|p| (p.target, p.source, p.confidence.to_bits()))
+                    .collect::<Vec<_>>(),
+                turned
+            );
+        }
+        let (p, places) = permuted(&g, &mut rng);
+        let moved = match_hypergraphs(&problem_of(&p, &h), &[], &settings);
+        assert_eq!(there.price.to_bits(), moved.price.to_bits());
+        for pair in &there.nodes {
+            let at = places[0][pair.target as usize] as u32;
+            assert!(
+                moved
+                    .nodes
+                    .iter()
+                    .any(|q| (q.target, q.source) == (at, pair.source))
+            );
+        }
+    }
+}

@@ -24,17 +24,26 @@
 //! Cost: a search node is three LSAPs, O(n^3) each; their number is exponential in the worst case. The limit counts
 //! search nodes, not seconds, so that the answer does not depend on the machine.
 
-use crate::assignment;
+use super::shares::{Couplings, KindBound, Open, Shares};
 use crate::graduated_assignment::discrete::{Discrete, best_columns};
-use crate::graduated_assignment::objective::{HypergraphObjective, Objective, Variable};
-use crate::matching_problem::{ElementMap, INCIDENCE_KINDS, Incident, MatchingProblem};
-use crate::table::Table;
+use crate::graduated_assignment::objective::{HypergraphObjective, Variable};
+use crate::matching_problem::{ElementMap, MatchingProblem};
 
 /// Gains closer than this fraction of the total price are equal.
 pub const RELATIVE_TOLERANCE: f64 = 1e-10;
 
 /// Kinds that are branched on: nodes and sheets.
 const BRANCHED: [usize; 2] = [0, 2];
+
+/// Kinds in the order in which a round of the dual ascent lets them take shares.
+const ASCENT_ORDER: [usize; 3] = [1, 0, 2];
+
+/// Most rounds of the dual ascent at the root and at every other search node.
+const ROOT_ROUNDS: usize = 60;
+const NODE_ROUNDS: usize = 2;
+
+/// A round that closes less than this fraction of the gap ends the ascent.
+const SETTLED: f64 = 0.02;
 
 /// What a search ends with; prices in the weights' unit.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,8 +62,8 @@ pub struct SearchResult {
 
 /// Lower bound of the price without any search: the branch bound at the root.
 pub fn root_lower_bound(problem: &MatchingProblem) -> f64 {
-    let mut search = Search::new(problem, 0.0, 0);
-    let bound = search.bound(f64::NEG_INFINITY);
+    let search = Search::new(problem, 0.0, 0);
+    let bound = search.bound(&search.couplings.equal_shares(), ROOT_ROUNDS, f64::NEG_INFINITY);
     (problem.total() - bound.gain).max(0.0)
 }
 
@@ -93,8 +102,8 @@ pub fn search(problem: &MatchingProblem, start: &ElementMap, max_search_nodes: u
 }
 
 struct Search<'a> {
-    problem: &'a MatchingProblem,
     objective: HypergraphObjective<'a>,
+    couplings: Couplings,
     /// Decided pairs and their gradient.
     state: Discrete,
     /// Whether an element is still undecided, for targets and sources of every kind.
@@ -116,6 +125,7 @@ struct Bound {
     branch: Option<Branch>,
     /// The curves' assignment: optimal once nodes and sheets are decided.
     curves: Vec<Option<usize>>,
+    shares: Shares,
 }
 
 struct Branch {
@@ -138,14 +148,14 @@ impl<'a> Search<'a> {
             tolerance: RELATIVE_TOLERANCE * problem.total(),
             visited: 0,
             limit,
-            problem,
+            couplings: Couplings::new(problem),
             objective,
             state,
         }
     }
 
     fn run(&mut self) {
-        let bound = self.bound(self.best_gain);
+        let bound = self.bound(&self.couplings.equal_shares(), ROOT_ROUNDS, self.best_gain);
         self.expand(bound);
     }
 
@@ -182,7 +192,7 @@ impl<'a> Search<'a> {
                     },
                 );
             }
-            let child = self.bound(self.best_gain);
+            let child = self.bound(&bound.shares, NODE_ROUNDS, self.best_gain);
             self.expand(child);
             if let Some(col) = choice {
                 self.state.remove(&self.objective, kind, row);
@@ -192,54 +202,77 @@ impl<'a> Search<'a> {
         self.open_target[kind][row] = true;
     }
 
-    /// The bound at the current decisions; a branch is only prepared when the bound beats `to_beat`.
-    fn bound(&mut self, to_beat: f64) -> Bound {
-        let rows = [0, 1, 2].map(|k| places(&self.open_target[k]));
-        // Sources are left over for good once no target of their kind is undecided.
-        let cols = [0, 1, 2].map(|k| {
-            if rows[k].is_empty() {
-                Vec::new()
-            } else {
-                places(&self.open_source[k])
-            }
-        });
-        let neighbours = OpenNeighbours::new(self.problem, &rows, &cols);
-        let tables: Vec<Table> = (0..3)
+    /// The bound at the current decisions, with better shares; a branch is only prepared when the bound beats `to_beat`.
+    fn bound(&self, shares: &Shares, rounds: usize, to_beat: f64) -> Bound {
+        let open = Open::new(&self.open_target, &self.open_source);
+        let mut shares = shares.clone();
+        let beaten = |gain: f64| gain <= to_beat + self.tolerance;
+        let mut parts: Vec<KindBound> = (0..3)
             .map(|k| {
-                Table::from_fn(rows[k].len(), cols[k].len(), |r, c| {
-                    let (x, y) = (rows[k][r], cols[k][c]);
-                    (self.state.gradient[k][(x, y)] + neighbours.shared(k, x, y)).max(0.0)
-                })
+                self.couplings
+                    .solve_kind(k, &self.state, &open, &mut shares, false)
             })
             .collect();
-        let mut gain = self.state.gain;
-        let mut solved = Vec::with_capacity(3);
-        for table in &tables {
-            let lsap = assignment::solve_max(table).expect("entries are finite and at least 0");
-            gain -= lsap.cost;
-            solved.push(lsap);
+        let total = |parts: &[KindBound]| self.state.gain + parts.iter().map(KindBound::value).sum::<f64>();
+        let mut gain = total(&parts);
+        for _ in 0..rounds {
+            let before = gain;
+            for kind in ASCENT_ORDER {
+                parts[kind] = self
+                    .couplings
+                    .solve_kind(kind, &self.state, &open, &mut shares, true);
+                gain = total(&parts);
+                if beaten(gain) {
+                    break;
+                }
+            }
+            let gap = (gain - to_beat).min(gain);
+            if beaten(gain) || before - gain < SETTLED * gap {
+                break;
+            }
         }
-        if gain <= to_beat + self.tolerance {
+        if beaten(gain) {
             return Bound {
                 gain,
                 branch: None,
                 curves: Vec::new(),
+                shares,
             };
         }
+        // A kind that took shares has larger leaders than it was solved with; the slacks need the present ones.
+        for k in 0..3 {
+            parts[k] = self
+                .couplings
+                .solve_kind(k, &self.state, &open, &mut shares, false);
+        }
+        let gain = total(&parts).min(gain);
+        let branch = self.branch(&open, &parts, gain, to_beat);
+        let curves = if branch.is_none() {
+            best_columns(&self.state.gradient[1])
+        } else {
+            Vec::new()
+        };
+        Bound {
+            gain,
+            branch,
+            curves,
+            shares,
+        }
+    }
+
+    /// The undecided node or sheet with the fewest choices that still beat `to_beat`.
+    fn branch(&self, open: &Open, parts: &[KindBound], gain: f64, to_beat: f64) -> Option<Branch> {
         let mut branch: Option<Branch> = None;
         for kind in BRANCHED {
-            let lsap = &solved[kind];
-            for r in 0..rows[kind].len() {
-                let (x, u) = (rows[kind][r], lsap.row_duals[r]);
-                let ceiling = |c: usize| gain - (-tables[kind][(r, c)] - u - lsap.col_duals[c]).max(0.0);
-                let beats = |g: f64| g > to_beat + self.tolerance;
-                let allowed =
-                    |c: usize| self.objective.linear()[kind][(x, cols[kind][c])] > f64::NEG_INFINITY;
-                let mut choices: Vec<(f64, Option<usize>)> = (0..cols[kind].len())
-                    .filter(|&c| allowed(c))
-                    .map(|c| (ceiling(c), Some(cols[kind][c])))
-                    .chain(std::iter::once((gain - (-u).max(0.0), None)))
-                    .filter(|choice| beats(choice.0))
+            let part = &parts[kind];
+            for (r, &row) in open.rows[kind].iter().enumerate() {
+                let allowed = |c: &usize| part.leaders[(r, *c)] > f64::NEG_INFINITY;
+                let matched = (0..open.cols[kind].len())
+                    .filter(allowed)
+                    .map(|c| (gain - part.slack(r, c), Some(open.cols[kind][c])));
+                let mut choices: Vec<(f64, Option<usize>)> = matched
+                    .chain(std::iter::once((gain - part.row_duals[r].max(0.0), None)))
+                    .filter(|choice| choice.0 > to_beat + self.tolerance)
                     .collect();
                 if branch.as_ref().is_none_or(|b| choices.len() < b.choices.len()) {
                     choices.sort_by(|a, b| {
@@ -247,77 +280,10 @@ impl<'a> Search<'a> {
                             .then(a.1.is_none().cmp(&b.1.is_none()))
                             .then(a.1.cmp(&b.1))
                     });
-                    branch = Some(Branch {
-                        kind,
-                        row: x,
-                        choices,
-                    });
+                    branch = Some(Branch { kind, row, choices });
                 }
             }
         }
-        let curves = if branch.is_none() {
-            best_columns(&self.state.gradient[1])
-        } else {
-            Vec::new()
-        };
-        Bound { gain, branch, curves }
+        branch
     }
-}
-
-fn places(open: &[bool]) -> Vec<usize> {
-    (0..open.len()).filter(|&k| open[k]).collect()
-}
-
-/// Strengths of undecided neighbours, descending, for every undecided element: by kind pair and direction.
-struct OpenNeighbours {
-    target: [[Vec<Vec<f64>>; 2]; 3],
-    source: [[Vec<Vec<f64>>; 2]; 3],
-}
-
-impl OpenNeighbours {
-    fn new(problem: &MatchingProblem, rows: &[Vec<usize>; 3], cols: &[Vec<usize>; 3]) -> Self {
-        let lists = |side: &crate::matching_problem::Side, open: &[Vec<usize>; 3]| {
-            [0, 1, 2].map(|pair| {
-                let (p, q) = INCIDENCE_KINDS[pair];
-                let incidences = &side.incidences[pair];
-                [
-                    sorted_strengths(&incidences.forward, &open[p], &open[q], side.count(q)),
-                    sorted_strengths(&incidences.backward, &open[q], &open[p], side.count(p)),
-                ]
-            })
-        };
-        Self {
-            target: lists(&problem.target, rows),
-            source: lists(&problem.source, cols),
-        }
-    }
-
-    /// `sum_k min(a_k, b_k)` over both kinds of neighbours.
-    fn shared(&self, kind: usize, x: usize, y: usize) -> f64 {
-        let mut sum = 0.0;
-        for (pair, (p, q)) in INCIDENCE_KINDS.into_iter().enumerate() {
-            let direction = if kind == p {
-                0
-            } else if kind == q {
-                1
-            } else {
-                continue;
-            };
-            let (a, b) = (&self.target[pair][direction][x], &self.source[pair][direction][y]);
-            sum += a.iter().zip(b).map(|(a, b)| a.min(*b)).sum::<f64>();
-        }
-        sum
-    }
-}
-
-fn sorted_strengths(lists: &[Vec<Incident>], of: &[usize], open: &[usize], count: usize) -> Vec<Vec<f64>> {
-    let mut is_open = vec![false; count];
-    open.iter().for_each(|&k| is_open[k] = true);
-    let mut sorted = vec![Vec::new(); lists.len()];
-    for &x in of {
-        let neighbours = lists[x].iter().filter(|i| is_open[i.element as usize]);
-        sorted[x] = neighbours.map(|i| i.strength).collect();
-        sorted[x].sort_by(|a, b| b.total_cmp(a));
-    }
-    sorted
 }

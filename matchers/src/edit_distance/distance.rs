@@ -14,12 +14,13 @@
 //! direction and any order of the elements (elements that their surroundings cannot tell apart excepted).
 
 use super::branch_and_bound::{self, RELATIVE_TOLERANCE, SearchResult};
-use super::canonical::Canonical;
 use super::costs::GroupCosts;
 use super::healing::{self, Heal, Healed};
 use super::operations::{Operation, edit_path};
 use super::relaxation::{Touched, relaxed_lower_bound};
-use crate::graduated_assignment::{MatchSettings, match_hypergraphs};
+use crate::canonical::Canonical;
+use crate::graduated_assignment::MatchSettings;
+use crate::graduated_assignment::hypergraphs::match_as_stored;
 use crate::hypergraph::{AttributedHypergraph, Kind};
 use crate::matching_problem::{
     ElementCosts, ElementMap, EvidenceSettings, MatchingProblem, ProblemError, Side,
@@ -267,7 +268,7 @@ impl<'a> Model<'a> {
         };
         let canonical = Canonical::new(&self.problem(&target, &source)?);
         let problem = &canonical.problem;
-        let first = match_hypergraphs(problem, &[], &self.settings.matching);
+        let first = match_as_stored(problem, &[], &self.settings.matching);
         let mut found = if exactly && self.small() {
             branch_and_bound::search(problem, &first.map, self.settings.max_search_nodes)
         } else {

@@ -12,20 +12,20 @@
 //! triangle inequality up to what a healed element can differ from its parts.
 //!
 //! * [`costs`]: deformation costs of single and healed elements
-//! * [`canonical`]: an order that does not depend on how graphs were stored
-//! * [`branch_and_bound`]: exact search and the branch lower bound, for fixed graphs
+//! * [`shares`]: the bound, made tight by dual ascent
+//! * [`branch_and_bound`]: exact search, for fixed graphs
 //! * [`healing`]: contract and merge
 //! * [`relaxation`]: a lower bound that holds for all heals
 //! * [`operations`]: the edit path
 //! * [`distance`]: the front door
 
 pub mod branch_and_bound;
-pub mod canonical;
 pub mod costs;
 pub mod distance;
 pub mod healing;
 pub mod operations;
 pub mod relaxation;
+pub mod shares;
 
 pub use costs::{AttributeCosts, GroupCosts, MergeRule, MergeRules};
 pub use distance::{EditDistance, EditSettings, edit_distance};

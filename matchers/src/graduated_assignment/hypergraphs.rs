@@ -12,6 +12,7 @@ use super::discrete::Discrete;
 use super::multistart::{MatchSettings, Maximum, maximise};
 use super::objective::HypergraphObjective;
 use super::starts::StartKind;
+use crate::canonical::Canonical;
 use crate::matching_problem::{ElementMap, MatchingProblem};
 use serde::{Deserialize, Serialize};
 
@@ -54,6 +55,9 @@ pub struct HypergraphMatch {
 
 /// Matches `source` to `target`.
 ///
+/// Works in canonical order ([`crate::canonical`]), so that prices are the same to the bit for either direction and any
+/// order of the elements.
+///
 /// # Complexity
 /// About 25 temperatures of at most 4 steps a start; a step is O(I I' + n n') for I incidences and n elements.
 ///
@@ -74,6 +78,35 @@ pub struct HypergraphMatch {
 /// assert_eq!((found.nodes[1].target, found.nodes[1].source), (1, 1));
 /// ```
 pub fn match_hypergraphs(
+    problem: &MatchingProblem,
+    hypotheses: &[ElementMap],
+    settings: &MatchSettings,
+) -> HypergraphMatch {
+    let canonical = Canonical::new(problem);
+    let inner: Vec<ElementMap> = hypotheses.iter().map(|h| canonical.import(h)).collect();
+    let found = match_as_stored(&canonical.problem, &inner, settings);
+    let carried = |kind: usize, pairs: Vec<MatchedPair>| -> Vec<MatchedPair> {
+        let mut out: Vec<MatchedPair> = pairs
+            .into_iter()
+            .map(|p| {
+                let (target, source) = canonical.export_pair(kind, p.target, p.source);
+                MatchedPair { target, source, ..p }
+            })
+            .collect();
+        out.sort_by_key(|p| p.target);
+        out
+    };
+    HypergraphMatch {
+        nodes: carried(0, found.nodes),
+        curves: carried(1, found.curves),
+        sheets: carried(2, found.sheets),
+        map: canonical.export(&found.map),
+        ..found
+    }
+}
+
+/// The same without canonical order: ties and rounding depend on the order of the elements.
+pub(crate) fn match_as_stored(
     problem: &MatchingProblem,
     hypotheses: &[ElementMap],
     settings: &MatchSettings,

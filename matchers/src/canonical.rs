@@ -79,6 +79,19 @@ impl Canonical {
         }
     }
 
+    /// Takes a pair of the canonical problem to the original one.
+    pub fn export_pair(&self, kind: usize, target: u32, source: u32) -> (u32, u32) {
+        let (t, s) = if self.exchanged {
+            (source, target)
+        } else {
+            (target, source)
+        };
+        (
+            self.target_order[kind][t as usize],
+            self.source_order[kind][s as usize],
+        )
+    }
+
     /// Takes a map of the canonical problem to the original one.
     pub fn export(&self, map: &ElementMap) -> ElementMap {
         let counts = [0, 1, 2].map(|k| self.target_order[k].len());
