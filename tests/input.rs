@@ -1,7 +1,18 @@
 //! Input: every real file is read, every format gives the same shape, every damaged file a clear error.
 
-use medial_scaffold::input::{Geometry, ReadSettings, read_shape};
+mod input_files;
+
+use input_files::{FACES, Holds, POINTS};
+use medial_scaffold::input::{
+    Fault, Frame, Geometry, Place, ReadError, ReadSettings, Shape, Units, read_bytes, read_shape,
+};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use std::path::{Path, PathBuf};
+
+fn read(name: &str, bytes: &[u8]) -> Result<Shape, ReadError> {
+    read_bytes(Path::new(name), bytes, &ReadSettings::default())
+}
 
 /// The folder of real shapes, or `None` with a word on the terminal.
 fn data() -> Option<PathBuf> {
@@ -68,4 +79,305 @@ fn every_real_file_is_read() {
     }
     println!("{read} files read");
     assert_eq!(read, 147);
+}
+
+#[test]
+fn every_format_gives_the_same_shape() {
+    for file in input_files::all() {
+        let shape = read(file.name, &file.bytes).unwrap_or_else(|e| panic!("{e}"));
+        match (&shape.geometry, file.holds) {
+            (Geometry::Mesh(mesh), Holds::Mesh) => {
+                // STL has no order of points; its triangles must still be the same.
+                let corners: Vec<[[f64; 3]; 3]> = mesh
+                    .triangles
+                    .iter()
+                    .map(|t| t.map(|i| mesh.points[i as usize].to_array()))
+                    .collect();
+                let expected: Vec<[[f64; 3]; 3]> =
+                    FACES.iter().map(|f| f.map(|i| POINTS[i as usize])).collect();
+                assert_eq!(corners, expected, "{}", file.name);
+                assert_eq!(mesh.points.len(), 6, "{}", file.name);
+                assert!(mesh.signed_volume() > 0.0);
+            }
+            (Geometry::Cloud(cloud), Holds::Cloud) => {
+                let points: Vec<[f64; 3]> = cloud.points.iter().map(|p| p.to_array()).collect();
+                assert_eq!(points, POINTS, "{}", file.name);
+                assert_eq!(
+                    cloud.normals.len(),
+                    if file.name == "normals.pwn" { 6 } else { 0 }
+                );
+            }
+            (Geometry::Labels(map), Holds::Labels) => {
+                assert_eq!(map.dims, input_files::DIMS, "{}", file.name);
+                let expected: Vec<i32> = input_files::labels().iter().map(|&v| i32::from(v)).collect();
+                assert_eq!(map.values, expected, "{}", file.name);
+                for corner in [[0.0, 0.0, 0.0], [6.0, 5.0, 4.0], [1.0, 0.0, 3.0]] {
+                    let at = map.position(corner.into()).to_array();
+                    for a in 0..3 {
+                        let truth = input_files::ORIGIN[a] + corner[a] * input_files::SPACING[a];
+                        assert!((at[a] - truth).abs() < 1e-6, "{}: {at:?}", file.name);
+                    }
+                }
+            }
+            (other, _) => panic!("{}: {other:?}", file.name),
+        }
+    }
+}
+
+#[test]
+fn frames_and_units_are_settled_once() {
+    let stated = b"ply\nformat ascii 1.0\ncomment SPACE=RAS\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n4 5 6\n7 8 10\n0 1 5\n";
+    let first = |settings: ReadSettings| {
+        let shape = read_bytes(Path::new("a.ply"), stated, &settings).expect("a cloud");
+        let Geometry::Cloud(c) = &shape.geometry else {
+            panic!("a cloud")
+        };
+        (
+            c.points[0].to_array(),
+            shape.provenance.frame.clone(),
+            shape.provenance.units.clone(),
+            shape.warnings.len(),
+        )
+    };
+    let default = ReadSettings::default();
+    assert_eq!(
+        first(default.clone()),
+        (
+            [-1.0, -2.0, 3.0],
+            "ras, by its SPACE comment".into(),
+            "mm, assumed".into(),
+            0
+        )
+    );
+    let told = ReadSettings {
+        frame: Some(Frame::Lps),
+        units: Some(Units::M),
+        ..default.clone()
+    };
+    let (point, frame, units, warnings) = first(told);
+    assert_eq!(
+        (point, frame.as_str(), units.as_str()),
+        ([1000.0, 2000.0, 3000.0], "lps, by request", "m, by request")
+    );
+    assert_eq!(warnings, 2, "the overruled frame and the size of 9 m");
+    let micrometres = ReadSettings {
+        units: Some(Units::Um),
+        ..default
+    };
+    assert_eq!(first(micrometres).0, [-0.001, -0.002, 0.003]);
+}
+
+#[test]
+fn one_label_is_kept_and_a_missing_one_names_the_others() {
+    let bytes = &input_files::all()
+        .into_iter()
+        .find(|f| f.name == "raw.nrrd")
+        .expect("it is there")
+        .bytes;
+    let pick = |label| {
+        let settings = ReadSettings {
+            label: Some(label),
+            ..Default::default()
+        };
+        read_bytes(Path::new("raw.nrrd"), bytes, &settings)
+    };
+    let Geometry::Labels(map) = pick(7).expect("label 7").geometry else {
+        panic!("labels")
+    };
+    assert_eq!(map.values.iter().filter(|&&v| v != 0).count(), 1);
+    let error = pick(3).expect_err("no label 3");
+    assert_eq!(error.flaw.fault, Fault::Label);
+    assert_eq!(
+        error.to_string(),
+        "raw.nrrd: label 3 is not in the file; choose one of its labels: 1, 7"
+    );
+}
+
+#[test]
+fn detached_data_files_are_found_beside_their_headers() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("v.raw"), input_files::labels()).expect("written");
+    let nhdr = "NRRD0005\ntype: uchar\ndimension: 3\nsizes: 7 6 5\nspacings: 0.5 0.75 2\nencoding: raw\ndata file: v.raw\n";
+    let mhd = "NDims = 3\nDimSize = 7 6 5\nElementType = MET_UCHAR\nElementDataFile = v.raw\n";
+    for (name, header) in [("v.nhdr", nhdr), ("v.mhd", mhd)] {
+        std::fs::write(at(name), header).expect("written");
+        let shape = read_shape(&at(name), &ReadSettings::default()).unwrap_or_else(|e| panic!("{e}"));
+        let Geometry::Labels(map) = shape.geometry else {
+            panic!("labels")
+        };
+        assert_eq!(
+            map.values[map.values.len() / 2],
+            i32::from(input_files::labels()[105])
+        );
+    }
+    std::fs::remove_file(at("v.raw")).expect("removed");
+    for name in ["v.nhdr", "v.mhd"] {
+        let error = read_shape(&at(name), &ReadSettings::default()).expect_err("no data");
+        assert_eq!(error.flaw.fault, Fault::Unreadable, "{error}");
+    }
+}
+
+/// The faults that a user meets, each named for what it is.
+#[test]
+fn each_fault_is_named_with_its_place() {
+    let header = |n: &str| {
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex {n}\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
+        )
+    };
+    let cases: Vec<(&str, Vec<u8>, Fault, Place)> = vec![
+        ("empty.ply", vec![], Fault::Empty, Place::File),
+        ("picture.jpg", b"\xff\xd8\xff\xe0 no shape".to_vec(), Fault::UnknownFormat, Place::File),
+        ("ply.stl", [header("1"), "0 0 0".into()].concat().into_bytes(), Fault::WrongExtension, Place::File),
+        ("text.ply", b"hello".to_vec(), Fault::WrongExtension, Place::File),
+        ("short.ply", [header("9"), "0 0 0\n1 1 1\n".into()].concat().into_bytes(), Fault::Truncated, Place::Line(8)),
+        ("huge.ply", [header("1000000000000"), "0 0 0\n".into()].concat().into_bytes(), Fault::Truncated, Place::Line(8)),
+        ("negative.ply", [header("-4"), "0 0 0\n".into()].concat().into_bytes(), Fault::Header, Place::Line(8)),
+        ("nan.ply", [header("4"), "0 0 0\n1 nan 1\n0 0 1\n1 0 0\n".into()].concat().into_bytes(), Fault::Number, Place::Line(9)),
+        ("word.ply", [header("4"), "0 0 0\n1 1 1\n0 zero 1\n1 0 0\n".into()].concat().into_bytes(), Fault::Number, Place::Line(10)),
+        ("index.off", b"OFF\n4 1 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 4\n".to_vec(), Fault::Index, Place::Line(7)),
+        ("zero.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 0 1 2\n".to_vec(), Fault::Index, Place::Line(5)),
+        ("same.xyz", "1 2 3\n".repeat(50).into_bytes(), Fault::Degenerate, Place::File),
+        ("three.xyz", b"0 0 0\n1 0 0\n0 1 0\n".to_vec(), Fault::Degenerate, Place::File),
+        ("line.xyz", b"0 0 0\n1 1 1\n2 2 2\n3 3 3\n9 9 9\n".to_vec(), Fault::Degenerate, Place::File),
+        ("plane.xyz", b"0 0 1\n1 0 1\n0 1 1\n1 1 1\n5 2 1\n".to_vec(), Fault::Degenerate, Place::File),
+        ("far.xyz", b"0 0 0\n1 0 0\n0 1e300 0\n0 0 1\n".to_vec(), Fault::Number, Place::Element { kind: "point", index: 2 }),
+        ("missing.csv", b"x,y,w\n1,2,3\n".to_vec(), Fault::Header, Place::Line(1)),
+        ("short.csv", b"x,y,z\n1,2,3\n1,2\n".to_vec(), Fault::Number, Place::Line(3)),
+        ("count.pts", b"7\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n".to_vec(), Fault::Truncated, Place::Line(1)),
+        ("blank.nrrd", b"NRRD0004\ntype: uchar\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n\n\0\0\0\0\0\0\0\0".to_vec(), Fault::Label, Place::File),
+        ("huge.nrrd", b"NRRD0004\ntype: uchar\ndimension: 3\nsizes: 10000 10000 10000\nencoding: raw\n\n\x01".to_vec(), Fault::TooLarge, Place::File),
+        ("large.nrrd", b"NRRD0004\ntype: uchar\ndimension: 3\nsizes: 500 500 500\nencoding: gzip\n\n\x1f\x8b".to_vec(), Fault::Truncated, Place::File),
+        ("grey.mha", b"NDims = 3\nDimSize = 2 1 1\nElementType = MET_FLOAT\nElementDataFile = LOCAL\n\0\0\x80\x3f\0\0\0\x3f".to_vec(), Fault::Number, Place::Element { kind: "voxel", index: 1 }),
+        ("flat.mha", b"NDims = 3\nDimSize = 1 1 1\nElementSpacing = 1 0 1\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n\x01".to_vec(), Fault::Header, Place::File),
+    ];
+    for (name, bytes, fault, place) in cases {
+        let error = read(name, &bytes).expect_err(name);
+        assert_eq!((error.flaw.fault, error.flaw.place), (fault, place), "{error}");
+        assert!(
+            error.to_string().starts_with(name) && error.flaw.remedy.len() > 5,
+            "{error}"
+        );
+    }
+    let missing = read_shape(Path::new("no/such/file.ply"), &ReadSettings::default()).expect_err("no file");
+    assert_eq!(missing.flaw.fault, Fault::Unreadable);
+}
+
+/// A gzipped text that inflates to far more than any real one.
+#[test]
+fn a_bomb_is_not_inflated() {
+    let bomb = input_files::gzip(&vec![b' '; 64 << 20]);
+    assert!(bomb.len() < 70_000);
+    let mut bytes = input_files::gzip(b"ply\nformat ascii 1.0\n");
+    bytes.extend(&bomb);
+    assert_eq!(
+        read("bomb.ply.gz", &bytes).expect_err("a bomb").flaw.fault,
+        Fault::TooLarge
+    );
+}
+
+/// Peak of the virtual memory of this process, kB; 0 where the system does not tell.
+fn peak_memory_kb() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status
+        .lines()
+        .find(|l| l.starts_with("VmPeak:"))
+        .unwrap_or_default();
+    line.split_whitespace()
+        .nth(1)
+        .and_then(|v| v.parse().ok())
+        .unwrap_or(0)
+}
+
+/// Damages a file in one of five ways.
+fn damage(bytes: &mut Vec<u8>, rng: &mut ChaCha8Rng) {
+    let n = bytes.len();
+    match rng.random_range(0..5) {
+        0 => bytes.truncate(rng.random_range(0..n)),
+        1 => {
+            for _ in 0..rng.random_range(1..9) {
+                let at = rng.random_range(0..n);
+                bytes[at] ^= 1 << rng.random_range(0..8);
+            }
+        }
+        2 => {
+            // Another number in place of one of those in the text.
+            let words = [
+                "-1",
+                "0",
+                "1000000000000",
+                "99999999999999999999",
+                "nan",
+                "1e999",
+                "-7.5e3",
+                "x",
+                "",
+                "4294967296",
+            ];
+            let starts: Vec<usize> = (1..n)
+                .filter(|&i| {
+                    bytes[i].is_ascii_digit() && !bytes[i - 1].is_ascii_alphanumeric() && bytes[i - 1] != b'.'
+                })
+                .collect();
+            if let Some(&start) = starts.get(rng.random_range(0..starts.len().max(1))) {
+                let length = bytes[start..].iter().take_while(|b| b.is_ascii_digit()).count();
+                bytes.splice(
+                    start..start + length,
+                    words[rng.random_range(0..words.len())].bytes(),
+                );
+            }
+        }
+        3 => {
+            let from = rng.random_range(0..n);
+            let to = (from + rng.random_range(1..40)).min(n);
+            bytes.drain(from..to);
+        }
+        _ => {
+            // Four bytes of a binary number, large or negative.
+            let at = rng.random_range(0..n);
+            let value: u32 = [0, 1, u32::MAX, 0x7fff_ffff, 0x7f80_0000, 0x7fc0_0000][rng.random_range(0..6)];
+            for (b, v) in bytes[at..].iter_mut().zip(value.to_le_bytes()) {
+                *b = v;
+            }
+        }
+    }
+}
+
+#[test]
+fn a_thousand_damaged_files_give_a_thousand_results() {
+    let files = input_files::all();
+    let runs: usize = if std::env::var_os("MEDIAL_SLOW").is_some() {
+        200_000
+    } else {
+        4_000
+    };
+    let before = peak_memory_kb();
+    let (mut errors, mut read_all_the_same) = (0, 0);
+    for seed in 0..runs {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed as u64);
+        let file = &files[seed % files.len()];
+        let mut bytes = file.bytes.clone();
+        damage(&mut bytes, &mut rng);
+        match read(file.name, &bytes) {
+            Ok(_) => read_all_the_same += 1,
+            Err(error) => {
+                errors += 1;
+                let text = error.to_string();
+                assert!(
+                    text.starts_with(file.name)
+                        && !error.flaw.found.is_empty()
+                        && !error.flaw.remedy.is_empty(),
+                    "{text}"
+                );
+            }
+        }
+    }
+    println!("{runs} damaged files: {errors} errors, {read_all_the_same} still usable");
+    assert_eq!(errors + read_all_the_same, runs);
+    assert!(errors > runs / 3);
+    assert!(
+        peak_memory_kb() - before < 1 << 20,
+        "a gigabyte for files of a kilobyte"
+    );
 }
