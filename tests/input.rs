@@ -4,7 +4,8 @@ mod input_files;
 
 use input_files::{FACES, Holds, POINTS};
 use medial_scaffold::input::{
-    Fault, Frame, Geometry, Place, ReadError, ReadSettings, Shape, Units, read_bytes, read_shape,
+    CheckContent, Fault, Frame, Geometry, LabelSurfaceSettings, Place, ReadError, ReadSettings,
+    RepairSettings, Shape, Units, check, check::Orientation, label_surface, read_bytes, read_shape, repair,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -126,7 +127,7 @@ fn every_format_gives_the_same_shape() {
 
 #[test]
 fn frames_and_units_are_settled_once() {
-    let stated = b"ply\nformat ascii 1.0\ncomment SPACE=RAS\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n4 5 6\n7 8 10\n0 1 5\n";
+    let stated = b"ply\nformat ascii 1.0\ncomment SPACE=RAS\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n4 5 6\n7 8 10\n0 3 5\n";
     let first = |settings: ReadSettings| {
         let shape = read_bytes(Path::new("a.ply"), stated, &settings).expect("a cloud");
         let Geometry::Cloud(c) = &shape.geometry else {
@@ -380,4 +381,110 @@ fn a_thousand_damaged_files_give_a_thousand_results() {
         peak_memory_kb() - before < 1 << 20,
         "a gigabyte for files of a kilobyte"
     );
+}
+
+/// What `check` must say of the closed real bones, and of those that the data's own notes call damaged.
+#[test]
+fn real_shapes_are_checked_and_repaired() {
+    let Some(root) = data() else { return };
+    let metres = ReadSettings {
+        units: Some(Units::M),
+        ..Default::default()
+    };
+    let mesh_of = |name: &str, settings: &ReadSettings| {
+        let shape = read_shape(&root.join(name), settings).unwrap_or_else(|e| panic!("{e}"));
+        let report = check(&shape);
+        let (CheckContent::Mesh(found), Geometry::Mesh(mesh)) =
+            (report.content.clone(), shape.geometry.clone())
+        else {
+            panic!("a mesh")
+        };
+        (report, found, mesh)
+    };
+    for bone in [
+        "capitate",
+        "hamate",
+        "lunate",
+        "scaphoid",
+        "trapezium",
+        "trapezoid",
+        "triquetrum",
+    ] {
+        let (report, found, _) = mesh_of(&format!("carpal_myosim_apache2/frameA/arm_r_{bone}.stl"), &metres);
+        assert!(report.usable, "{bone}: {:?}", report.problems);
+        assert_eq!(
+            (found.orientation, found.topology.euler),
+            (Orientation::Outward, 2),
+            "{bone}"
+        );
+        let volume = found.volume_mm3.expect("closed");
+        assert!((500.0..6000.0).contains(&volume), "{bone}: {volume} mm^3");
+        let back: medial_scaffold::input::CheckReport =
+            serde_json::from_str(&serde_json::to_string(&report).expect("JSON")).expect("a report");
+        assert_eq!(back.problems, report.problems);
+    }
+    let (report, found, mesh) = mesh_of("aorta_vmtk_localonly/aorta-surface.stl", &ReadSettings::default());
+    println!("aorta: {:?} {:?}", found, report.problems);
+    let repaired = repair(&mesh, &RepairSettings::default());
+    println!("aorta repaired: {:?}", repaired.changes.lines());
+    if found.topology.watertight {
+        assert_eq!(found.orientation, Orientation::Inward);
+        assert!(repaired.mesh.signed_volume() > 0.0);
+        assert_eq!(repaired.changes.turned_triangles, mesh.triangles.len());
+    }
+    for name in [
+        "carpal_myosim_apache2/frameA/arm_r_pisiform.stl",
+        "tarsal_visiblehuman_ccby4/VHF_Right/VHF_Right_Bone_Talus_smooth.stl",
+        "mouse_skull_localonly/A_J.ply",
+        "neuron_hemibrain_localonly/722817260.obj",
+        "generic_mixed_localonly/fandisk.off",
+        "generic_mixed_localonly/hand.mesh",
+    ] {
+        let (report, found, mesh) = mesh_of(name, &ReadSettings::default());
+        println!("{name}: usable {} {found:?}", report.usable);
+        println!(
+            "   repaired: {:?}",
+            repair(&mesh, &RepairSettings::default()).changes.lines()
+        );
+    }
+}
+
+/// Label surfaces of every real mask: closed, oriented, manifold, of about the voxels' volume.
+#[test]
+fn real_masks_give_closed_surfaces() {
+    let Some(root) = data() else { return };
+    let mut files = Vec::new();
+    walk(&root, &mut files);
+    let mut masks = 0;
+    for path in files.iter().filter(|p| p.to_string_lossy().contains(".n")) {
+        let shape = read_shape(path, &ReadSettings::default()).unwrap_or_else(|e| panic!("{e}"));
+        let Geometry::Labels(map) = &shape.geometry else {
+            continue;
+        };
+        for passes in [0, 20] {
+            let settings = LabelSurfaceSettings {
+                label: None,
+                smoothing_passes: passes,
+            };
+            let surface = label_surface(map, &settings).unwrap_or_else(|e| panic!("{e}"));
+            let t = surface.mesh.topology();
+            assert!(
+                t.watertight && t.oriented && t.nonmanifold_vertices == 0,
+                "{}: {t:?}",
+                path.display()
+            );
+            let by_voxels = surface.voxels as f64 * map.voxel_volume_mm3();
+            let ratio = surface.volume_mm3 / by_voxels;
+            assert!((0.7..1.05).contains(&ratio), "{}: {ratio}", path.display());
+            println!(
+                "{} passes {passes}: {} triangles, volume {:.2} of voxels {:.2} ({ratio:.4})",
+                path.strip_prefix(&root).unwrap_or(path).display(),
+                t.triangles,
+                surface.volume_mm3,
+                by_voxels
+            );
+        }
+        masks += 1;
+    }
+    assert_eq!(masks, 42);
 }

@@ -545,6 +545,16 @@ impl Encoded for Base64<'_> {
                 "the file is damaged: export it again",
             )
         })?;
+        if out.len() < bytes {
+            // Padding in the middle of the text ends it early.
+            return Err(Flaw::truncated(
+                self.place,
+                format!(
+                    "{bytes} bytes of an array should follow, the base64 text holds {}",
+                    out.len()
+                ),
+            ));
+        }
         out.truncate(bytes);
         Ok(out)
     }

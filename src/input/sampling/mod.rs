@@ -147,13 +147,14 @@ pub fn sample_mesh(
     settings: &SamplingSettings,
     feature_angle_deg: f64,
 ) -> Result<Sampling, SamplingError> {
-    let mesh = canonical(mesh);
+    let mut mesh = canonical(mesh);
+    let inward = turn_outward(&mut mesh);
     let area = mesh.area();
     if !(area.is_finite() && area > 0.0) {
         return Err(SamplingError::NoArea);
     }
     if settings.vertices {
-        return vertices(mesh, area);
+        return vertices(mesh, area).map(|s| s.with(inward));
     }
     let count = wanted(&mesh, area, settings)?;
     let spacing = (area / count as f64).sqrt();
@@ -170,7 +171,24 @@ pub fn sample_mesh(
             format!(", {} of them on sharp edges", features.len())
         }
     )];
-    finish(points, source, mesh, spacing_mm, features.len(), remarks)
+    finish(points, source, mesh, spacing_mm, features.len(), remarks).map(|s| s.with(inward))
+}
+
+/// Turns a closed mesh that looks inward, and says so. The inside must be where the winding number is positive.
+fn turn_outward(mesh: &mut TriangleMesh) -> Option<String> {
+    let topology = mesh.topology();
+    if !(topology.watertight && topology.oriented && mesh.signed_volume() < 0.0) {
+        return None;
+    }
+    mesh.flip();
+    Some("the triangles look inward: they were turned outward for this run".into())
+}
+
+impl Sampling {
+    fn with(mut self, remark: Option<String>) -> Self {
+        self.remarks.extend(remark);
+        self
+    }
 }
 
 /// Samples that the settings ask for.

@@ -1,0 +1,515 @@
+//! Repair of a mesh, only when asked for, with a list of what was changed.
+//!
+//! In: a mesh as read. Out: the mesh with equal points joined, useless faces dropped, all faces turned one way and outward; maps
+//! from old to new points and faces; counts of every change.
+//!
+//! 1. Points of equal coordinates (or nearer than a tolerance) become one.
+//! 2. Faces with a repeated point are dropped. Faces on the same three points are dropped but for one, or altogether when they
+//!    cancel (two faces back to back enclose nothing), unless the whole mesh is a sheet given with both its sides. Faces
+//!    without area on three points stay: they hold the surface closed.
+//! 3. Faces are turned to agree across every edge with two faces.
+//! 4. A closed component that no other encloses is turned outward. One that lies inside another keeps the turn the file gave it
+//!    relative to the outermost (a cavity stays a cavity), and becomes a cavity when the file gave it none.
+//! 5. Points that no face uses are dropped.
+//!
+//! Nothing is added: holes stay holes and edges with three faces stay so; [`super::check`] names them.
+//! Cost `O(n log n)`, and `O(c)` winding numbers for each of `c` closed components.
+
+use crate::geometry::{Neighbours, TriangleMesh, WindingNumber, mesh::DisjointSets};
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+
+/// What repair may do.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct RepairSettings {
+    /// Points nearer than this are joined, mm; 0 joins exactly equal ones only.
+    pub weld_mm: f64,
+    /// Turn faces to agree and outward.
+    pub orient: bool,
+}
+
+impl Default for RepairSettings {
+    fn default() -> Self {
+        Self {
+            weld_mm: 0.0,
+            orient: true,
+        }
+    }
+}
+
+/// No new element: the old one was dropped.
+pub const DROPPED: u32 = u32::MAX;
+
+/// A repaired mesh and what was changed.
+#[derive(Clone, Debug, Default)]
+pub struct Repaired {
+    /// The mesh.
+    pub mesh: TriangleMesh,
+    /// New point of every old one, or [`DROPPED`].
+    pub point_map: Vec<u32>,
+    /// New triangle of every old one, or [`DROPPED`].
+    pub triangle_map: Vec<u32>,
+    /// What was changed.
+    pub changes: RepairChanges,
+}
+
+/// Counts of the changes.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RepairChanges {
+    /// Points joined to another.
+    pub welded_points: usize,
+    /// Points dropped because no face uses them.
+    pub unused_points: usize,
+    /// Faces dropped because two of their corners are one point.
+    pub degenerate_triangles: usize,
+    /// Faces dropped because another has the same three points.
+    pub duplicate_triangles: usize,
+    /// Faces turned round.
+    pub turned_triangles: usize,
+    /// Components that cannot be oriented (one-sided surfaces) and were left as they are.
+    pub one_sided_components: usize,
+}
+
+impl RepairChanges {
+    /// The changes in plain words; empty when there were none.
+    pub fn lines(&self) -> Vec<String> {
+        [
+            (
+                self.welded_points,
+                "points were joined to another at the same place",
+            ),
+            (
+                self.degenerate_triangles,
+                "triangles with two equal corners were dropped",
+            ),
+            (
+                self.duplicate_triangles,
+                "triangles that lie on another one were dropped",
+            ),
+            (self.turned_triangles, "triangles were turned round"),
+            (self.unused_points, "points that no triangle uses were dropped"),
+            (
+                self.one_sided_components,
+                "one-sided components cannot be oriented and were left as they are",
+            ),
+        ]
+        .iter()
+        .filter(|(n, _)| *n > 0)
+        .map(|(n, what)| format!("{n} {what}"))
+        .collect()
+    }
+}
+
+/// Repairs a mesh; see the module's documentation.
+pub fn repair(mesh: &TriangleMesh, settings: &RepairSettings) -> Repaired {
+    let mut changes = RepairChanges::default();
+    let welded = weld(mesh, settings.weld_mm);
+    changes.welded_points = welded
+        .iter()
+        .enumerate()
+        .filter(|(i, w)| *i != **w as usize)
+        .count();
+    let mut triangles: Vec<[u32; 3]> = Vec::with_capacity(mesh.triangles.len());
+    let mut triangle_map = vec![DROPPED; mesh.triangles.len()];
+    let joined: Vec<[u32; 3]> = mesh
+        .triangles
+        .iter()
+        .map(|t| t.map(|v| welded[v as usize]))
+        .collect();
+    let kept = kept_triangles(&joined, &mut changes);
+    for (i, t) in joined.iter().enumerate() {
+        if kept[i] {
+            triangle_map[i] = triangles.len() as u32;
+            triangles.push(*t);
+        }
+    }
+    let mut out = TriangleMesh {
+        points: mesh.points.clone(),
+        triangles,
+    };
+    if settings.orient {
+        let given = out.triangles.clone();
+        orient(&mut out, &mut changes);
+        changes.turned_triangles = given.iter().zip(&out.triangles).filter(|(a, b)| a != b).count();
+    }
+    let point_map = drop_unused(&mut out, &welded, &mut changes);
+    Repaired {
+        mesh: out,
+        point_map,
+        triangle_map,
+        changes,
+    }
+}
+
+/// Which triangles stay: those with three corners, and of those on the same corners what is left when opposite ones cancel.
+fn kept_triangles(triangles: &[[u32; 3]], changes: &mut RepairChanges) -> Vec<bool> {
+    // Sorted by corners; with them whether the turn is that of the sorted corners.
+    let mut keyed: Vec<([u32; 3], u32, bool)> = triangles
+        .iter()
+        .enumerate()
+        .map(|(i, &[a, b, c])| {
+            let mut key = [a, b, c];
+            key.sort_unstable();
+            (key, i as u32, [[a, b, c], [b, c, a], [c, a, b]].contains(&key))
+        })
+        .collect();
+    keyed.sort_unstable();
+    let sound = |key: &[u32; 3]| key[0] != key[1] && key[1] != key[2];
+    let groups = || keyed.chunk_by(|a, b| a.0 == b.0).filter(|g| sound(&g[0].0));
+    let net = |g: &[([u32; 3], u32, bool)]| 2 * g.iter().filter(|f| f.2).count() as i64 - g.len() as i64;
+    // A sheet given with both its sides cancels as a whole; then one side of each face is kept.
+    let two_sided = groups().all(|g| net(g) == 0);
+    let mut kept = vec![false; triangles.len()];
+    for g in groups() {
+        let side = match net(g) {
+            0 if two_sided => Some(g[0].2),
+            0 => None,
+            n => Some(n > 0),
+        };
+        if let Some(first) = g.iter().find(|f| Some(f.2) == side) {
+            kept[first.1 as usize] = true;
+        }
+    }
+    changes.degenerate_triangles = keyed.iter().filter(|f| !sound(&f.0)).count();
+    changes.duplicate_triangles =
+        triangles.len() - changes.degenerate_triangles - kept.iter().filter(|k| **k).count();
+    kept
+}
+
+/// For every point the smallest index among those joined with it.
+fn weld(mesh: &TriangleMesh, tolerance_mm: f64) -> Vec<u32> {
+    let mut sets = DisjointSets::new(mesh.points.len());
+    if tolerance_mm > 0.0 {
+        let tree = Neighbours::new(&mesh.points);
+        for (i, &p) in mesh.points.iter().enumerate() {
+            for n in tree.within(p, tolerance_mm) {
+                sets.union(i as u32, n.index);
+            }
+        }
+    } else {
+        let mut first: HashMap<[u64; 3], u32> = HashMap::with_capacity(mesh.points.len());
+        for (i, &p) in mesh.points.iter().enumerate() {
+            let key = (p + glam::DVec3::ZERO).to_array().map(f64::to_bits); // -0 is 0
+            let twin = *first.entry(key).or_insert(i as u32);
+            sets.union(i as u32, twin);
+        }
+    }
+    (0..mesh.points.len() as u32).map(|i| sets.find(i)).collect()
+}
+
+fn drop_unused(mesh: &mut TriangleMesh, welded: &[u32], changes: &mut RepairChanges) -> Vec<u32> {
+    let mut slot = vec![DROPPED; mesh.points.len()];
+    for &v in mesh.triangles.iter().flatten() {
+        slot[v as usize] = 0;
+    }
+    let mut points = Vec::new();
+    for (i, s) in slot.iter_mut().enumerate() {
+        if *s == 0 {
+            *s = points.len() as u32;
+            points.push(mesh.points[i]);
+        } else if welded[i] as usize == i {
+            changes.unused_points += 1;
+        }
+    }
+    for t in &mut mesh.triangles {
+        *t = t.map(|v| slot[v as usize]);
+    }
+    mesh.points = points;
+    welded.iter().map(|&w| slot[w as usize]).collect()
+}
+
+/// Turns faces to agree, then closed components outward.
+fn orient(mesh: &mut TriangleMesh, changes: &mut RepairChanges) {
+    let parts = mesh.components();
+    let neighbours = across_edges(mesh);
+    let mut turned = vec![false; mesh.triangles.len()];
+    let mut shells: Vec<Shell> = Vec::new();
+    for part in &parts {
+        let agreement = agree(part, &neighbours, &mut turned);
+        if agreement == Agreement::Impossible {
+            changes.one_sided_components += 1;
+            continue;
+        }
+        for &t in part {
+            if turned[t as usize] {
+                mesh.triangles[t as usize].swap(1, 2);
+            }
+        }
+        let piece = mesh.submesh(part);
+        if piece.topology().watertight {
+            shells.push(Shell {
+                triangles: part.clone(),
+                volume: piece.signed_volume(),
+                given: agreement == Agreement::AsGiven,
+                piece,
+            });
+        }
+    }
+    for (i, flip) in turn_outward(&shells).into_iter().enumerate() {
+        if flip {
+            for &t in &shells[i].triangles {
+                mesh.triangles[t as usize].swap(1, 2);
+            }
+        }
+    }
+}
+
+/// A closed component whose faces agree.
+struct Shell {
+    triangles: Vec<u32>,
+    piece: TriangleMesh,
+    volume: f64,
+    /// The file gave it this orientation.
+    given: bool,
+}
+
+/// Which shells must be turned over.
+fn turn_outward(shells: &[Shell]) -> Vec<bool> {
+    let windings: Vec<Option<WindingNumber>> = shells.iter().map(|s| WindingNumber::new(&s.piece)).collect();
+    // For every shell those that enclose it, the largest last.
+    let enclosing: Vec<Vec<usize>> = (0..shells.len())
+        .map(|i| {
+            let probe = shells[i].piece.points[0];
+            let mut around: Vec<usize> = (0..shells.len())
+                .filter(|&j| j != i && shells[j].volume.abs() > shells[i].volume.abs())
+                .filter(|&j| windings[j].as_ref().is_some_and(|w| w.winding(probe).abs() > 0.5))
+                .collect();
+            around.sort_by(|&a, &b| {
+                shells[a]
+                    .volume
+                    .abs()
+                    .total_cmp(&shells[b].volume.abs())
+                    .then(a.cmp(&b))
+            });
+            around
+        })
+        .collect();
+    (0..shells.len())
+        .map(|i| match enclosing[i].last() {
+            None => shells[i].volume < 0.0,
+            // The file's own turn, relative to that of the outermost shell about it.
+            Some(&outermost) if shells[i].given && shells[outermost].given => shells[outermost].volume < 0.0,
+            // No turn of its own: solid and hollow take turns from outside in.
+            Some(_) => (shells[i].volume < 0.0) == enclosing[i].len().is_multiple_of(2),
+        })
+        .collect()
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Agreement {
+    AsGiven,
+    AfterTurning,
+    Impossible,
+}
+
+/// A neighbour across an edge with two faces, and whether the two run along it the same way (so one must be turned).
+#[derive(Clone, Copy)]
+struct Across {
+    triangle: u32,
+    clash: bool,
+}
+
+/// The neighbours of every triangle across its edges with exactly two faces.
+fn across_edges(mesh: &TriangleMesh) -> Vec<[Option<Across>; 3]> {
+    let mut sides: Vec<(u32, u32, u32, bool)> = mesh
+        .triangles
+        .iter()
+        .enumerate()
+        .flat_map(|(i, &[a, b, c])| {
+            [(a, b), (b, c), (c, a)].map(|(u, v)| (u.min(v), u.max(v), i as u32, u < v))
+        })
+        .collect();
+    sides.sort_unstable();
+    let mut out = vec![[None; 3]; mesh.triangles.len()];
+    for run in sides.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+        let &[(_, _, s, s_forward), (_, _, t, t_forward)] = run else {
+            continue;
+        };
+        let clash = s_forward == t_forward;
+        for (from, to) in [(s, t), (t, s)] {
+            if let Some(free) = out[from as usize].iter_mut().find(|n| n.is_none()) {
+                *free = Some(Across { triangle: to, clash });
+            }
+        }
+    }
+    out
+}
+
+/// Marks the faces of a component that must be turned; the largest group that agrees as given stays.
+fn agree(part: &[u32], neighbours: &[[Option<Across>; 3]], turned: &mut [bool]) -> Agreement {
+    let mut seen: HashMap<u32, ()> = HashMap::with_capacity(part.len());
+    let mut possible = true;
+    let mut any = false;
+    // A component joined by points or by edges of three faces falls into several patches.
+    for &seed in part {
+        if seen.contains_key(&seed) {
+            continue;
+        }
+        seen.insert(seed, ());
+        let mut patch = vec![seed];
+        let mut next = 0;
+        while next < patch.len() {
+            let t = patch[next];
+            next += 1;
+            for n in neighbours[t as usize].iter().flatten() {
+                let wanted = turned[t as usize] ^ n.clash;
+                if seen.insert(n.triangle, ()).is_none() {
+                    turned[n.triangle as usize] = wanted;
+                    patch.push(n.triangle);
+                } else if turned[n.triangle as usize] != wanted {
+                    possible = false;
+                }
+            }
+        }
+        let flips = patch.iter().filter(|&&t| turned[t as usize]).count();
+        if 2 * flips > patch.len() {
+            for &t in &patch {
+                turned[t as usize] ^= true;
+            }
+        }
+        any |= flips > 0;
+    }
+    if !possible {
+        for &t in part {
+            turned[t as usize] = false;
+        }
+        Agreement::Impossible
+    } else if any {
+        Agreement::AfterTurning
+    } else {
+        Agreement::AsGiven
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    fn tetrahedron(scale: f64) -> TriangleMesh {
+        TriangleMesh {
+            points: [
+                [-1.0, -1.0, -1.0],
+                [3.0, -1.0, -1.0],
+                [-1.0, 3.0, -1.0],
+                [-1.0, -1.0, 3.0],
+            ]
+            .map(|p| DVec3::from_array(p) * scale)
+            .to_vec(),
+            triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
+        }
+    }
+
+    fn joined(parts: &[TriangleMesh]) -> TriangleMesh {
+        let mut out = TriangleMesh::default();
+        for p in parts {
+            let base = out.points.len() as u32;
+            out.points.extend(&p.points);
+            out.triangles
+                .extend(p.triangles.iter().map(|t| t.map(|i| i + base)));
+        }
+        out
+    }
+
+    #[test]
+    fn a_sound_mesh_is_left_alone() {
+        let mesh = tetrahedron(1.0);
+        let fixed = repair(&mesh, &RepairSettings::default());
+        assert_eq!((fixed.mesh, fixed.changes), (mesh, RepairChanges::default()));
+        assert_eq!(fixed.point_map, [0, 1, 2, 3]);
+    }
+
+    #[test]
+    fn a_soup_with_every_fault_comes_out_closed_and_outward() {
+        let sound = tetrahedron(1.0);
+        let mut soup = TriangleMesh::default();
+        for (i, t) in sound.triangles.iter().enumerate() {
+            let base = soup.points.len() as u32;
+            soup.points.extend(t.map(|v| sound.points[v as usize]));
+            soup.triangles.push(if i == 1 {
+                [base, base + 2, base + 1]
+            } else {
+                [base, base + 1, base + 2]
+            });
+        }
+        soup.triangles.push([0, 0, 1]);
+        soup.triangles.push(soup.triangles[2]);
+        soup.points.push(DVec3::splat(9.0));
+        let fixed = repair(&soup, &RepairSettings::default());
+        let t = fixed.mesh.topology();
+        assert!(t.watertight && t.oriented);
+        assert!((fixed.mesh.signed_volume() - sound.signed_volume()).abs() < 1e-12);
+        let expected = RepairChanges {
+            welded_points: 8,
+            unused_points: 1,
+            degenerate_triangles: 1,
+            duplicate_triangles: 1,
+            turned_triangles: 1,
+            one_sided_components: 0,
+        };
+        assert_eq!(fixed.changes, expected);
+        assert_eq!(fixed.triangle_map, [0, 1, 2, 3, DROPPED, DROPPED]);
+        for (old, &new) in fixed.point_map.iter().enumerate().take(12) {
+            assert_eq!(fixed.mesh.points[new as usize], soup.points[old]);
+        }
+        assert_eq!(fixed.point_map[12], DROPPED);
+    }
+
+    #[test]
+    fn faces_back_to_back_cancel_but_a_two_sided_sheet_keeps_one_side() {
+        let mut pillow = tetrahedron(1.0);
+        pillow
+            .points
+            .extend([DVec3::X * 9.0, DVec3::X * 9.5, DVec3::Y * 9.0]);
+        pillow.triangles.extend([[4, 5, 6], [5, 4, 6]]);
+        let fixed = repair(&pillow, &RepairSettings::default());
+        assert_eq!(fixed.mesh, tetrahedron(1.0));
+        assert_eq!(
+            (fixed.changes.duplicate_triangles, fixed.changes.unused_points),
+            (2, 3)
+        );
+        let mut sheet = tetrahedron(1.0);
+        sheet.triangles = vec![[0, 1, 2], [1, 3, 2], [2, 1, 0], [3, 1, 2]];
+        let fixed = repair(&sheet, &RepairSettings::default());
+        assert_eq!(fixed.mesh.triangles, [[0, 1, 2], [1, 3, 2]]);
+    }
+
+    #[test]
+    fn cavities_stay_cavities_and_solids_solids() {
+        let (outer, mut inner) = (tetrahedron(1.0), tetrahedron(0.2));
+        inner.flip();
+        let hollow = outer.signed_volume() + inner.signed_volume();
+        let mut inward = joined(&[outer.clone(), inner.clone()]);
+        inward.flip();
+        let fixed = repair(&inward, &RepairSettings::default());
+        assert!((fixed.mesh.signed_volume() - hollow).abs() < 1e-12);
+        // Both outward by the file: stays so.
+        let solid = joined(&[outer.clone(), tetrahedron(0.2)]);
+        let fixed = repair(&solid, &RepairSettings::default());
+        assert_eq!(fixed.changes, RepairChanges::default());
+        // The inner one given no orientation: a cavity.
+        let mut mixed = joined(&[outer, tetrahedron(0.2)]);
+        mixed.triangles[5].swap(0, 1);
+        let fixed = repair(&mixed, &RepairSettings::default());
+        assert!((fixed.mesh.signed_volume() - hollow).abs() < 1e-12);
+    }
+
+    #[test]
+    fn near_points_are_joined_within_the_tolerance_only() {
+        let mut mesh = tetrahedron(1.0);
+        mesh.points.push(mesh.points[0] + DVec3::X * 1e-3);
+        mesh.triangles[3][0] = 4;
+        assert!(
+            !repair(&mesh, &RepairSettings::default())
+                .mesh
+                .topology()
+                .watertight
+        );
+        let settings = RepairSettings {
+            weld_mm: 2e-3,
+            ..Default::default()
+        };
+        assert!(repair(&mesh, &settings).mesh.topology().watertight);
+    }
+}
