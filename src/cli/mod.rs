@@ -8,11 +8,10 @@ mod output;
 mod progress;
 mod run_record;
 
-// mod check;
-// mod demo;
-// mod match_command;
+mod check;
+mod match_command;
+mod mesh;
 mod scaffold;
-// mod synth;
 
 use clap::{Parser, Subcommand};
 use common::Common;
@@ -32,8 +31,14 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// What is in a file, is it usable, in which frame and units; exit 1 if not.
+    Check(check::CheckArgs),
+    /// Surface mesh of a point cloud, by segregation.
+    Mesh(mesh::MeshArgs),
     /// Scaffold of one shape.
     Scaffold(scaffold::ScaffoldArgs),
+    /// Correspondences, rigid transform and shape difference of two shapes.
+    Match(match_command::MatchArgs),
 }
 
 /// Why a command did not end well: the message, what to do about it, and the exit code.
@@ -91,7 +96,10 @@ pub fn main() -> ExitCode {
     }
     let common = &cli.common;
     let done = match &cli.command {
+        Command::Check(args) => check::run(args, common),
+        Command::Mesh(args) => mesh::run(args, common),
         Command::Scaffold(args) => scaffold::run(args, common),
+        Command::Match(args) => match_command::run(args, common),
     };
     match done {
         Ok(Verdict::Fine) => ExitCode::SUCCESS,

@@ -4,7 +4,10 @@ use crate::coarse_scaffold::{CoarseScaffold, Curve, CurveKind, Node, Sheet};
 use crate::fine_scaffold::{Betti, Side};
 use crate::full_scaffold::CriticalCounts;
 use crate::geometry::TriangleMesh;
+use crate::matching::{Correspondences, Edit, ShapeDistance};
+use crate::registration::{Difference, Registration};
 use crate::regularise::Event;
+use crate::segregation::CloudReport;
 use serde::Serialize;
 
 /// `scaffold.json`.
@@ -26,6 +29,8 @@ pub struct ScaffoldDocument<'a> {
     pub full: CriticalCounts,
     /// The surface.
     pub surface: SurfaceSummary,
+    /// How a raw cloud was prepared, meshed and closed; null for shapes that come with a surface.
+    pub segregation: Option<&'a CloudReport>,
     /// Betti numbers of solid and scaffold by two routes.
     pub topology: TopologySummary,
     /// Numbers of elements.
@@ -143,4 +148,98 @@ pub struct Fidelity {
     pub mean: f64,
     /// Largest as a share of the bounding box's diagonal, percent.
     pub hausdorff_percent_diag: f64,
+}
+
+/// `match.json`.
+#[derive(Clone, Debug, Serialize)]
+#[allow(
+    non_snake_case,
+    reason = "frames are written as they are read: target from source"
+)]
+pub struct MatchDocument<'a> {
+    /// Name of this schema.
+    pub schema: &'static str,
+    /// Version of the program that wrote it.
+    pub version: &'static str,
+    /// Units of every length: mm.
+    pub units: &'static str,
+    /// Frame of every position: LPS.
+    pub frame: &'static str,
+    /// Name of the target.
+    pub target: &'a str,
+    /// Name of the source.
+    pub source: &'a str,
+    /// The pose and how well it is known: `T_target_source`, `converged`, `mirrored`, `ambiguous`, `hypotheses`, `rms` ...
+    #[serde(flatten)]
+    pub registration: &'a Registration,
+    /// Who corresponds to whom; null when a shape has no scaffold.
+    pub correspondences: Option<&'a Correspondences>,
+    /// Distance of the shapes, mm; null when a shape has no scaffold.
+    pub shape_distance: Option<f64>,
+    /// The parts of the distance, with and without size.
+    pub shape_distance_parts: Option<&'a ShapeDistance>,
+    /// The way from one scaffold to the other.
+    pub edit: Option<&'a Edit>,
+    /// Persistence at which both scaffolds were cut, mm.
+    pub cut_mm: Option<f64>,
+    /// How the surfaces differ.
+    pub difference: Option<&'a Difference>,
+    /// What a user must know.
+    pub warnings: &'a [String],
+}
+
+/// What `mesh --json` prints.
+#[derive(Clone, Debug, Serialize)]
+pub struct SurfaceDocument<'a> {
+    /// Name of this schema.
+    pub schema: &'static str,
+    /// Version of the program that wrote it.
+    pub version: &'static str,
+    /// Points given.
+    pub points: usize,
+    /// Vertices used by a triangle.
+    pub vertices: usize,
+    /// Triangles.
+    pub triangles: usize,
+    /// Edges with one triangle.
+    pub boundary_edges: usize,
+    /// Edges with three or more triangles.
+    pub nonmanifold_edges: usize,
+    /// Connected components.
+    pub components: usize,
+    /// Euler number.
+    pub euler: i64,
+    /// Whether every edge has two triangles.
+    pub watertight: bool,
+    /// Whether a consistent orientation exists.
+    pub orientable: bool,
+    /// Volume, mm^3; null for an open surface.
+    pub volume: Option<f64>,
+    /// Area, mm^2.
+    pub area: f64,
+    /// Decisions, numbers, holes, doubts.
+    pub report: &'a CloudReport,
+}
+
+impl<'a> SurfaceDocument<'a> {
+    /// Measures a segregated surface made of `points` input points.
+    pub fn new(points: usize, mesh: &TriangleMesh, report: &'a CloudReport) -> Self {
+        let t = mesh.topology();
+        Self {
+            schema: "medial-scaffold/mesh",
+            version: env!("CARGO_PKG_VERSION"),
+            points,
+            vertices: t.vertices,
+            triangles: t.triangles,
+            boundary_edges: t.boundary_edges,
+            nonmanifold_edges: t.nonmanifold_edges,
+            components: t.components,
+            euler: t.euler,
+            watertight: t.watertight,
+            orientable: t.orientable,
+            volume: (t.watertight && t.oriented).then(|| mesh.signed_volume()),
+            area: mesh.area(),
+            report,
+        }
+    }
 }

@@ -2,9 +2,11 @@
 
 pub mod documents;
 pub mod error;
+pub mod matching;
 pub mod scaffold;
 pub mod timing;
 
 pub use error::{PipelineError, StageError};
+pub use matching::{MatchRun, MatchSettings, MatchSide, match_shapes};
 pub use scaffold::{ScaffoldRun, ScaffoldSettings, scaffold};
 pub use timing::{Observer, StageTime, Stages};

@@ -19,7 +19,8 @@ use crate::input::Shape;
 use crate::input::sampling::{SamplingSettings, sample};
 use crate::regularise::{RegulariseSettings, Regularised, regularise};
 use crate::segregation::{
-    KnownSurfaceSettings, Segregation, SegregationSettings, segregate_cloud, segregate_known_refined,
+    CloudReport, KnownSurfaceSettings, Segregation, SegregationSettings, segregate_cloud,
+    segregate_known_refined,
 };
 use serde::{Deserialize, Serialize};
 
@@ -56,6 +57,8 @@ pub struct ScaffoldRun {
     pub surface: TriangleMesh,
     /// The input's own surface, when it has one.
     pub known_surface: Option<TriangleMesh>,
+    /// How a raw cloud was prepared, meshed and closed.
+    pub cloud: Option<CloudReport>,
     /// Critical points of the radius flow over all of space.
     pub full: CriticalCounts,
     /// Fine scaffold.
@@ -118,6 +121,7 @@ pub(super) fn run(
         triangulation: sided.triangulation,
         segregation: sided.segregation,
         known_surface: sided.known_surface,
+        cloud: sided.cloud,
         full: full.counts,
         fine,
         regularised,
@@ -134,6 +138,7 @@ struct Sided {
     triangulation: Triangulation,
     segregation: Segregation,
     known_surface: Option<TriangleMesh>,
+    cloud: Option<CloudReport>,
 }
 
 fn side_of_surface(
@@ -156,6 +161,7 @@ fn side_of_surface(
                 triangulation: found.triangulation,
                 segregation: found.result.segregation,
                 known_surface: Some(known),
+                cloud: None,
             });
         }
         warnings.push(format!(
@@ -170,6 +176,7 @@ fn side_of_surface(
         triangulation: found.triangulation,
         segregation: found.segregation,
         known_surface: None,
+        cloud: Some(found.report),
     })
 }
 
@@ -186,6 +193,7 @@ impl ScaffoldRun {
             side: self.side,
             full: self.full,
             surface: SurfaceSummary::of(&self.surface),
+            segregation: self.cloud.as_ref(),
             topology: self.topology,
             counts: Counts::of(&self.coarse),
             fidelity: Fidelity {

@@ -8,7 +8,10 @@ use std::process::{Command, Output};
 
 /// Runs `medial` with these arguments.
 pub fn medial(args: &[&str]) -> Output {
-    Command::new(assert_cmd::cargo::cargo_bin!("medial")).args(args).output().expect("the binary was built with the tests")
+    Command::new(assert_cmd::cargo::cargo_bin!("medial"))
+        .args(args)
+        .output()
+        .expect("the binary was built with the tests")
 }
 
 /// What it wrote to stderr.
@@ -16,16 +19,12 @@ pub fn stderr(out: &Output) -> String {
     String::from_utf8_lossy(&out.stderr).into_owned()
 }
 
-/// A capitate-like bone, closed, in mm.
-pub fn bone() -> TriangleMesh {
-    let mesh = datasets_synthetic::bones::capitate_like(0).mesh(1.0);
-    TriangleMesh { points: mesh.points, triangles: mesh.triangles }
-}
-
 /// Folder of real shapes: `MEDIAL_DATA`, or `../shared/data` beside the workspace; says so when there is none.
 pub fn real_data() -> Option<PathBuf> {
-    let dir = std::env::var_os("MEDIAL_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
+    let dir = std::env::var_os("MEDIAL_DATA").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
+        PathBuf::from,
+    );
     if dir.is_dir() {
         return Some(dir);
     }
@@ -46,5 +45,12 @@ pub fn write_ply(path: &Path, mesh: &TriangleMesh) {
     for t in &mesh.triangles {
         text += &format!("3 {} {} {}\n", t[0], t[1], t[2]);
     }
-    std::fs::File::create(path).and_then(|mut f| f.write_all(text.as_bytes())).expect("writable");
+    std::fs::File::create(path)
+        .and_then(|mut f| f.write_all(text.as_bytes()))
+        .expect("writable");
+}
+
+/// Whether the long sweeps were asked for.
+pub fn slow() -> bool {
+    std::env::var_os("MEDIAL_SLOW").is_some_and(|v| v == "1")
 }
