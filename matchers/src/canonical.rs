@@ -22,9 +22,10 @@ pub struct Canonical {
     pub problem: MatchingProblem,
     /// Whether the sides were exchanged.
     pub exchanged: bool,
-    /// Old position of every target element, by kind, before the exchange.
-    target_order: [Vec<u32>; 3],
-    source_order: [Vec<u32>; 3],
+    /// Old position of every element of the target given, by kind, whether or not it became the source.
+    pub target_order: [Vec<u32>; 3],
+    /// The same for the source given.
+    pub source_order: [Vec<u32>; 3],
 }
 
 impl Canonical {

@@ -398,6 +398,58 @@ impl AttributedHypergraph {
         }
     }
 
+    /// The same hypergraph with its elements in another order: element k of a kind is the old element `order[kind][k]`.
+    ///
+    /// Ends of curves, boundaries of sheets and corners are put in ascending order.
+    ///
+    /// # Panics
+    /// When an order is not a permutation of the elements of its kind.
+    pub fn reordered(&self, order: &[Vec<u32>; 3]) -> Self {
+        let place = Kind::ALL.map(|k| {
+            let mut place = vec![u32::MAX; self.count(k)];
+            order[k.index()]
+                .iter()
+                .enumerate()
+                .for_each(|(new, &old)| place[old as usize] = new as u32);
+            assert!(
+                order[k.index()].len() == place.len() && !place.contains(&u32::MAX),
+                "not a permutation"
+            );
+            place
+        });
+        let node = |n: NodeId| NodeId(place[0][n.index()]);
+        let mut g = Self::new();
+        g.nodes = order[0].iter().map(|&n| self.nodes[n as usize].clone()).collect();
+        for &c in &order[1] {
+            let mut curve = self.curves[c as usize].clone();
+            curve.ends = match curve.ends {
+                CurveEnds::Closed => CurveEnds::Closed,
+                CurveEnds::One(a) => CurveEnds::One(node(a)),
+                CurveEnds::Two(a, b) => CurveEnds::Two(node(a).min(node(b)), node(a).max(node(b))),
+            };
+            g.curves.push(curve);
+        }
+        for &s in &order[2] {
+            let mut sheet = self.sheets[s as usize].clone();
+            sheet
+                .curves
+                .iter_mut()
+                .for_each(|c| *c = CurveId(place[1][c.index()]));
+            sheet.curves.sort_unstable();
+            g.sheets.push(sheet);
+        }
+        g.corners = self.corners.clone();
+        for c in &mut g.corners {
+            (c.sheet, c.node) = (SheetId(place[2][c.sheet.index()]), node(c.node));
+        }
+        g.corners.sort_by(|a, b| {
+            (a.sheet, a.node)
+                .cmp(&(b.sheet, b.node))
+                .then(a.turn.total_cmp(&b.turn))
+        });
+        g
+    }
+
     /// Number of attributes of every element of a kind; `None` when there is no element.
     pub fn attribute_count(&self, kind: Kind) -> Option<usize> {
         (self.count(kind) > 0).then(|| self.attributes(kind, 0).len())

@@ -6,7 +6,9 @@ use common::{permuted, problem_of, random_hypergraph, settings_scales};
 use matchers::assignment;
 use matchers::edit_distance::branch_and_bound::{root_lower_bound, search};
 use matchers::edit_distance::healing::{apply, candidates};
-use matchers::edit_distance::{EditDistance, EditSettings, GroupCosts, Operation, edit_distance};
+use matchers::edit_distance::{
+    EditDistance, EditSettings, GraphSide, GroupCosts, Heal, Operation, edit_distance,
+};
 use matchers::graduated_assignment::{MatchSettings, match_hypergraphs};
 use matchers::hypergraph::Kind;
 use matchers::matching_problem::{ElementMap, Side};
@@ -316,6 +318,93 @@ fn bounds_bracket_and_the_path_adds_up() {
             assert!(d.lower_bound <= exact.upper_bound + eps && exact.upper_bound <= d.upper_bound + eps);
         }
     }
+}
+
+/// The path, read back in the numbers of the graphs given, costs what it says: heals applied, the map priced anew.
+#[test]
+fn the_path_can_be_replayed() {
+    let mut rng = ChaCha8Rng::seed_from_u64(14);
+    let mut healed = 0;
+    for _ in 0..12 {
+        let g = random_hypergraph(&mut rng, 5, 7, 3);
+        let h = random_hypergraph(&mut rng, 6, 7, 3);
+        let costs = ElementCosts::from_attributes(&g, &h, &settings_scales()).unwrap();
+        let evidence = EvidenceSettings::default();
+        let plain_path = edit_distance(&g, &h, &costs, &plain()).unwrap();
+        let price = problem_of(&g, &h).price(&plain_path.map(&g));
+        assert!((price - plain_path.upper_bound).abs() < 1e-9);
+
+        let d = edit_distance(
+            &g,
+            &h,
+            &costs,
+            &EditSettings {
+                max_heal_sets: 100,
+                ..EditSettings::default()
+            },
+        )
+        .unwrap();
+        let replay = |graph: &AttributedHypergraph, wanted: GraphSide| {
+            let all = candidates(graph, &Side::new(graph, &evidence), true, true);
+            let named = |o: &Operation| match *o {
+                Operation::Contract {
+                    side, curve, nodes, ..
+                } => Some((side, Kind::Curve, curve, Kind::Node, nodes)),
+                Operation::Merge {
+                    side,
+                    removed_kind,
+                    removed,
+                    joined_kind,
+                    joined,
+                    ..
+                } => Some((side, removed_kind, removed, joined_kind, joined)),
+                _ => None,
+            };
+            let list: Vec<_> = d
+                .operations
+                .iter()
+                .filter_map(named)
+                .filter(|o| o.0 == wanted)
+                .map(|(_, rk, r, jk, j)| {
+                    let same =
+                        |c: &&Heal| (c.removed_kind, c.removed, c.joined_kind, c.joined) == (rk, r, jk, j);
+                    *all.iter().find(same).expect("the path names a heal of its graph")
+                })
+                .collect();
+            apply(graph, &list).expect("the heals of a path agree")
+        };
+        let (a, b) = (replay(&g, GraphSide::Target), replay(&h, GraphSide::Source));
+        healed += usize::from(a.price + b.price > 0.0);
+        let table = |kind: Kind| {
+            let (t, s) = (&a.parts[kind.index()], &b.parts[kind.index()]);
+            Table::from_fn(t.len(), s.len(), |r, c| costs.cost(kind, &t[r], &s[c]))
+        };
+        let tables = ElementCosts {
+            nodes: table(Kind::Node),
+            curves: table(Kind::Curve),
+            sheets: table(Kind::Sheet),
+        };
+        let problem = MatchingProblem::new(&a.graph, &b.graph, &tables, &evidence).unwrap();
+        let mut map = ElementMap::empty(&problem);
+        for o in &d.operations {
+            if let Operation::Deform {
+                kind, target, source, ..
+            } = o
+            {
+                let at = |parts: &[Vec<u32>], list: &[u32]| {
+                    parts.iter().position(|p| p.contains(&list[0])).unwrap()
+                };
+                let (x, y) = (
+                    at(&a.parts[kind.index()], target),
+                    at(&b.parts[kind.index()], source),
+                );
+                map.source_of_target[kind.index()][x] = Some(y as u32);
+            }
+        }
+        let price = a.price + b.price + problem.price(&map);
+        assert!((price - d.upper_bound).abs() < 1e-9, "{price} {}", d.upper_bound);
+    }
+    assert!(healed > 0, "no path with a heal was replayed");
 }
 
 /// Deform and splice alone make a pseudo-metric.

@@ -1,5 +1,6 @@
 //! What it costs to deform one element into another when either may be healed from several parts.
 
+use crate::canonical::Canonical;
 use crate::hypergraph::{AttributedHypergraph, Kind};
 use crate::matching_problem::{AttributeScales, ElementCosts, ProblemError};
 use serde::{Deserialize, Serialize};
@@ -17,6 +18,30 @@ pub trait GroupCosts {
 impl GroupCosts for ElementCosts {
     fn cost(&self, kind: Kind, target: &[u32], source: &[u32]) -> f64 {
         self.of(kind)[(target[0] as usize, source[0] as usize)]
+    }
+}
+
+/// Costs between canonical graphs, asked of the costs between the graphs given.
+pub(super) struct CanonicalCosts<'a> {
+    pub costs: &'a dyn GroupCosts,
+    pub canonical: &'a Canonical,
+}
+
+impl GroupCosts for CanonicalCosts<'_> {
+    fn cost(&self, kind: Kind, target: &[u32], source: &[u32]) -> f64 {
+        let (target, source) = if self.canonical.exchanged {
+            (source, target)
+        } else {
+            (target, source)
+        };
+        let old = |order: &[Vec<u32>; 3], list: &[u32]| -> Vec<u32> {
+            list.iter().map(|&x| order[kind.index()][x as usize]).collect()
+        };
+        self.costs.cost(
+            kind,
+            &old(&self.canonical.target_order, target),
+            &old(&self.canonical.source_order, source),
+        )
     }
 }
 

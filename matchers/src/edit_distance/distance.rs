@@ -4,23 +4,24 @@
 //!
 //! 1. Without heals: graduated assignment gives an upper bound, the branch bound a lower one, and branch and bound closes
 //!    the gap while the graphs are small and the limit lasts.
-//! 2. Heals are added one by one, the best first, as long as one lowers the price.
+//! 2. Heals that lower the price are added, the most useful first; every one is judged by carrying the map over and
+//!    polishing it.
 //! 3. Small graphs: branch and bound over sets of heals, cheapest heal first. A set of heals costs at least its price plus
 //!    [`super::relaxation`]; where no heal can be added below the best price, step 1 settles the set exactly.
 //! 4. The path is written for the cheapest map found.
 //!
 //! Larger graphs skip step 3; their lower bound is the relaxation over all heals.
-//! Every pair of healed graphs is solved in canonical order, so that the answer is the same to the bit for either
-//! direction and any order of the elements (elements that their surroundings cannot tell apart excepted).
+//! All of it works on the graphs in canonical order, so that the answer is the same to the bit for either direction and any
+//! order of the elements (elements that their surroundings cannot tell apart excepted).
 
 use super::branch_and_bound::{self, RELATIVE_TOLERANCE, SearchResult};
-use super::costs::GroupCosts;
+use super::costs::{CanonicalCosts, GroupCosts};
 use super::healing::{self, Heal, Healed};
 use super::operations::{Operation, edit_path};
 use super::relaxation::{Touched, relaxed_lower_bound};
 use crate::canonical::Canonical;
 use crate::graduated_assignment::MatchSettings;
-use crate::graduated_assignment::hypergraphs::match_as_stored;
+use crate::graduated_assignment::hypergraphs::{match_as_stored, polished};
 use crate::hypergraph::{AttributedHypergraph, Kind};
 use crate::matching_problem::{
     ElementCosts, ElementMap, EvidenceSettings, MatchingProblem, ProblemError, Side,
@@ -43,7 +44,7 @@ pub struct EditSettings {
     pub max_search_nodes: usize,
     /// Most sets of heals looked at in the proof.
     pub max_heal_sets: usize,
-    /// Most heals tried in one round of step 2, cheapest first.
+    /// Most heals judged in one round of step 2, cheapest first.
     pub max_heals_tried: usize,
     /// How the first map is found.
     pub matching: MatchSettings,
@@ -115,31 +116,55 @@ pub fn edit_distance(
     costs: &dyn GroupCosts,
     settings: &EditSettings,
 ) -> Result<EditDistance, ProblemError> {
-    let model = Model::new(target, source, costs, settings)?;
+    let given = problem_of(
+        (&healing::unhealed(target), &healing::unhealed(source)),
+        costs,
+        &settings.evidence,
+    )?;
+    let canonical = Canonical::new(&given);
+    let costs = CanonicalCosts {
+        costs,
+        canonical: &canonical,
+    };
+    let (target, source) = (
+        target.reordered(&canonical.target_order),
+        source.reordered(&canonical.source_order),
+    );
+    let (first, second) = if canonical.exchanged {
+        (&source, &target)
+    } else {
+        (&target, &source)
+    };
+    let mut distance = canonical_distance(&Model::new(first, second, &costs, settings))?;
+    distance.operations = distance
+        .operations
+        .into_iter()
+        .map(|o| o.carried(&canonical))
+        .collect();
+    Ok(distance)
+}
+
+fn canonical_distance(model: &Model) -> Result<EditDistance, ProblemError> {
+    let settings = model.settings;
     let mut best = model
-        .solve(&Heals::default(), true)?
+        .solve(&Heals::default())?
         .expect("no heals do not contradict each other");
-    let mut lower_bound = best.found.lower_bound;
-    let mut exact = best.found.exact;
     let mut proof = Proof {
         heal_sets: 1,
         search_nodes: best.found.search_nodes,
-        open: f64::INFINITY,
+        open: best.found.lower_bound,
     };
     if settings.contract || settings.merge {
         model.heal_greedily(&mut best, &mut proof)?;
         if model.small() {
-            model.prove(&mut best, &mut proof)?;
-            lower_bound = proof.open.min(best.price);
-            exact = lower_bound >= best.price - model.tolerance;
+            proof.open = f64::INFINITY;
+            let limit = proof.heal_sets + settings.max_heal_sets;
+            model.expand(&Heals::default(), 0.0, 0, limit, &mut best, &mut proof)?;
         } else {
-            lower_bound = model
-                .relaxed(&Heals::default(), 0, best.price)?
-                .unwrap_or(0.0)
-                .min(best.price);
-            exact = lower_bound >= best.price - model.tolerance;
+            proof.open = model.relaxed(&Heals::default(), 0, best.price)?.unwrap_or(0.0);
         }
     }
+    let exact = proof.open >= best.price - model.tolerance;
     let problem = model.problem(&best.target, &best.source)?;
     let operations = edit_path(
         &problem,
@@ -149,7 +174,11 @@ pub fn edit_distance(
     );
     let total = model.total;
     Ok(EditDistance {
-        lower_bound: if exact { best.price } else { lower_bound.max(0.0) },
+        lower_bound: if exact {
+            best.price
+        } else {
+            proof.open.clamp(0.0, best.price)
+        },
         upper_bound: best.price,
         exact,
         similarity: if total > 0.0 {
@@ -211,7 +240,7 @@ impl<'a> Model<'a> {
         source: &'a AttributedHypergraph,
         costs: &'a dyn GroupCosts,
         settings: &'a EditSettings,
-    ) -> Result<Self, ProblemError> {
+    ) -> Self {
         let sides = [target, source].map(|g| Side::new(g, &settings.evidence));
         let mut candidates = Vec::new();
         for (side, on_target) in [(0, true), (1, false)] {
@@ -222,7 +251,7 @@ impl<'a> Model<'a> {
         candidates.sort_by(|a, b| a.heal.price.total_cmp(&b.heal.price));
         let total = sides[0].total() + sides[1].total();
         let tolerance = RELATIVE_TOLERANCE * total;
-        Ok(Self {
+        Self {
             target,
             source,
             costs,
@@ -230,7 +259,7 @@ impl<'a> Model<'a> {
             candidates,
             total,
             tolerance,
-        })
+        }
     }
 
     /// Whether the distance is to be proven.
@@ -242,16 +271,7 @@ impl<'a> Model<'a> {
     }
 
     fn problem(&self, target: &Healed, source: &Healed) -> Result<MatchingProblem, ProblemError> {
-        let table = |kind: Kind| {
-            let (t, s) = (&target.parts[kind.index()], &source.parts[kind.index()]);
-            Table::from_fn(t.len(), s.len(), |r, c| self.costs.cost(kind, &t[r], &s[c]))
-        };
-        let costs = ElementCosts {
-            nodes: table(Kind::Node),
-            curves: table(Kind::Curve),
-            sheets: table(Kind::Sheet),
-        };
-        MatchingProblem::new(&target.graph, &source.graph, &costs, &self.settings.evidence)
+        problem_of((target, source), self.costs, &self.settings.evidence)
     }
 
     fn apply(&self, heals: &Heals) -> Option<(Healed, Healed)> {
@@ -261,18 +281,17 @@ impl<'a> Model<'a> {
         ))
     }
 
-    /// The cheapest map for a set of heals; exactly when asked for and small. `None` when heals contradict each other.
-    fn solve(&self, heals: &Heals, exactly: bool) -> Result<Option<Solution>, ProblemError> {
+    /// The cheapest map for a set of heals, proven when the graphs are small. `None` when heals contradict each other.
+    fn solve(&self, heals: &Heals) -> Result<Option<Solution>, ProblemError> {
         let Some((target, source)) = self.apply(heals) else {
             return Ok(None);
         };
-        let canonical = Canonical::new(&self.problem(&target, &source)?);
-        let problem = &canonical.problem;
-        let first = match_as_stored(problem, &[], &self.settings.matching);
-        let mut found = if exactly && self.small() {
-            branch_and_bound::search(problem, &first.map, self.settings.max_search_nodes)
+        let problem = self.problem(&target, &source)?;
+        let first = match_as_stored(&problem, &[], &self.settings.matching);
+        let found = if self.small() {
+            branch_and_bound::search(&problem, &first.map, self.settings.max_search_nodes)
         } else {
-            let lower_bound = branch_and_bound::root_lower_bound(problem).min(first.price);
+            let lower_bound = branch_and_bound::root_lower_bound(&problem).min(first.price);
             let exact = lower_bound >= first.price - self.tolerance;
             SearchResult {
                 upper_bound: first.price,
@@ -282,10 +301,57 @@ impl<'a> Model<'a> {
                 search_nodes: 0,
             }
         };
-        found.map = canonical.export(&found.map);
         let price = target.price + source.price + found.upper_bound;
         Ok(Some(Solution {
             heals: heals.clone(),
+            target,
+            source,
+            found,
+            price,
+        }))
+    }
+
+    /// The map of a solution carried to one more heal and polished: an upper bound, at a fraction of [`Self::solve`].
+    fn carried(&self, from: &Solution, candidate: &Candidate) -> Result<Option<Solution>, ProblemError> {
+        let heals = self.with(&from.heals, candidate);
+        let Some((target, source)) = self.apply(&heals) else {
+            return Ok(None);
+        };
+        let problem = self.problem(&target, &source)?;
+        let mut map = ElementMap::empty(&problem);
+        for k in 0..3 {
+            let place = |parts: &[Vec<u32>], count: usize| {
+                let mut at = vec![None; count];
+                for (new, list) in parts.iter().enumerate() {
+                    list.iter().for_each(|&x| at[x as usize] = Some(new as u32));
+                }
+                at
+            };
+            let kind = Kind::ALL[k];
+            let target_place = place(&target.parts[k], self.target.count(kind));
+            let source_place = place(&source.parts[k], self.source.count(kind));
+            for (x, y) in from.found.map.source_of_target[k].iter().enumerate() {
+                let Some(y) = *y else { continue };
+                let (x, y) = (from.target.parts[k][x][0], from.source.parts[k][y as usize][0]);
+                if let (Some(x), Some(y)) = (target_place[x as usize], source_place[y as usize])
+                    && map.source_of_target[k][x as usize].is_none()
+                {
+                    map.source_of_target[k][x as usize] = Some(y);
+                }
+            }
+        }
+        let map = polished(&problem, &map, &self.settings.matching);
+        let upper_bound = problem.price(&map);
+        let price = target.price + source.price + upper_bound;
+        let found = SearchResult {
+            upper_bound,
+            lower_bound: 0.0,
+            exact: false,
+            map,
+            search_nodes: 0,
+        };
+        Ok(Some(Solution {
+            heals,
             target,
             source,
             found,
@@ -305,24 +371,35 @@ impl<'a> Model<'a> {
         more
     }
 
-    /// Adds the heal that lowers the price most, until none does.
+    /// Adds heals that lower the price, those that lower it most first, until none does.
     fn heal_greedily(&self, best: &mut Solution, proof: &mut Proof) -> Result<(), ProblemError> {
         loop {
-            let mut better: Option<Solution> = None;
+            let mut useful = Vec::new();
             let affordable = self.candidates.iter().take_while(|c| c.heal.price < best.price);
             for candidate in affordable.take(self.settings.max_heals_tried) {
-                let Some(next) = self.solve(&self.with(&best.heals, candidate), false)? else {
-                    continue;
-                };
                 proof.heal_sets += 1;
-                let least = better.as_ref().map_or(best.price, |b| b.price);
-                if next.price < least - self.tolerance {
-                    better = Some(next);
+                if let Some(next) = self.carried(best, candidate)?
+                    && next.price < best.price - self.tolerance
+                {
+                    useful.push((next.price, candidate));
                 }
             }
-            match better {
-                Some(next) => *best = next,
-                None => return Ok(()),
+            if useful.is_empty() {
+                return Ok(());
+            }
+            useful.sort_by(|a, b| a.0.total_cmp(&b.0));
+            for (_, candidate) in useful {
+                if let Some(next) = self.carried(best, candidate)?
+                    && next.price < best.price - self.tolerance
+                {
+                    *best = next;
+                }
+            }
+            proof.heal_sets += 1;
+            if let Some(anew) = self.solve(&best.heals)?
+                && anew.price < best.price
+            {
+                *best = anew;
             }
         }
     }
@@ -354,11 +431,6 @@ impl<'a> Model<'a> {
         Ok(Some(price + relaxed_lower_bound(&problem, &t, &s)))
     }
 
-    fn prove(&self, best: &mut Solution, proof: &mut Proof) -> Result<(), ProblemError> {
-        let limit = proof.heal_sets + self.settings.max_heal_sets;
-        self.expand(&Heals::default(), 0.0, 0, limit, best, proof)
-    }
-
     /// Settles a set of heals and its supersets by candidates from `next` on.
     fn expand(
         &self,
@@ -385,7 +457,7 @@ impl<'a> Model<'a> {
             .get(next)
             .filter(|c| price + c.heal.price < best.price - self.tolerance);
         let Some(candidate) = candidate else {
-            let Some(settled) = self.solve(heals, true)? else {
+            let Some(settled) = self.solve(heals)? else {
                 return Ok(());
             };
             proof.search_nodes += settled.found.search_nodes;
@@ -409,7 +481,24 @@ impl<'a> Model<'a> {
     }
 }
 
-/// The map from target to source in original elements: heaviest parts of matched elements.
+/// The problem of two healed hypergraphs.
+fn problem_of(
+    (target, source): (&Healed, &Healed),
+    costs: &dyn GroupCosts,
+    evidence: &EvidenceSettings,
+) -> Result<MatchingProblem, ProblemError> {
+    let table = |kind: Kind| {
+        let (t, s) = (&target.parts[kind.index()], &source.parts[kind.index()]);
+        Table::from_fn(t.len(), s.len(), |r, c| costs.cost(kind, &t[r], &s[c]))
+    };
+    let costs = ElementCosts {
+        nodes: table(Kind::Node),
+        curves: table(Kind::Curve),
+        sheets: table(Kind::Sheet),
+    };
+    MatchingProblem::new(&target.graph, &source.graph, &costs, evidence)
+}
+
 impl EditDistance {
     /// Pairs (target, source) of the heaviest parts of deformed elements of a kind, by target.
     pub fn correspondences(&self, kind: Kind) -> Vec<(u32, u32)> {

@@ -135,6 +135,11 @@ pub fn incident_strength(side: &Side, kind: usize, x: usize) -> f64 {
     }
 }
 
+/// A hypergraph as it is, in the form of a healed one.
+pub fn unhealed(g: &AttributedHypergraph) -> Healed {
+    apply(g, &[]).expect("no heals do not contradict each other")
+}
+
 /// Applies heals; `None` when they contradict each other.
 pub fn apply(g: &AttributedHypergraph, heals: &[Heal]) -> Option<Healed> {
     let mut removed = Kind::ALL.map(|k| vec![false; g.count(k)]);

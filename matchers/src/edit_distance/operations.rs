@@ -4,6 +4,7 @@
 //! go), else with the deformation of the element of the higher kind.
 
 use super::healing::{Heal, Healed};
+use crate::canonical::Canonical;
 use crate::hypergraph::Kind;
 use crate::matching_problem::{ElementMap, INCIDENCE_KINDS, MatchingProblem};
 use serde::{Deserialize, Serialize};
@@ -80,6 +81,85 @@ impl Operation {
             | Operation::Splice { price, .. }
             | Operation::Contract { price, .. }
             | Operation::Merge { price, .. } => *price,
+        }
+    }
+}
+
+impl Operation {
+    /// Takes an operation of the canonical graphs to the graphs given.
+    pub(super) fn carried(self, canonical: &Canonical) -> Self {
+        let turn = |side: GraphSide| match (side, canonical.exchanged) {
+            (GraphSide::Target, false) | (GraphSide::Source, true) => GraphSide::Target,
+            _ => GraphSide::Source,
+        };
+        let orders = |side: GraphSide| match side {
+            GraphSide::Target => &canonical.target_order,
+            GraphSide::Source => &canonical.source_order,
+        };
+        let one = |side: GraphSide, kind: Kind, x: u32| orders(turn(side))[kind.index()][x as usize];
+        let all = |side: GraphSide, kind: Kind, list: Vec<u32>| -> Vec<u32> {
+            list.into_iter().map(|x| one(side, kind, x)).collect()
+        };
+        let two = |side: GraphSide, kind: Kind, [a, b]: [u32; 2]| {
+            let (a, b) = (one(side, kind, a), one(side, kind, b));
+            [a.min(b), a.max(b)]
+        };
+        match self {
+            Operation::Deform {
+                kind,
+                target,
+                source,
+                price,
+            } => {
+                let (t, s) = (
+                    all(GraphSide::Target, kind, target),
+                    all(GraphSide::Source, kind, source),
+                );
+                let (target, source) = if canonical.exchanged { (s, t) } else { (t, s) };
+                Operation::Deform {
+                    kind,
+                    target,
+                    source,
+                    price,
+                }
+            }
+            Operation::Splice {
+                side,
+                kind,
+                parts,
+                price,
+            } => Operation::Splice {
+                side: turn(side),
+                kind,
+                parts: all(side, kind, parts),
+                price,
+            },
+            Operation::Contract {
+                side,
+                curve,
+                nodes,
+                price,
+            } => Operation::Contract {
+                side: turn(side),
+                curve: one(side, Kind::Curve, curve),
+                nodes: two(side, Kind::Node, nodes),
+                price,
+            },
+            Operation::Merge {
+                side,
+                removed_kind,
+                removed,
+                joined_kind,
+                joined,
+                price,
+            } => Operation::Merge {
+                side: turn(side),
+                removed_kind,
+                removed: one(side, removed_kind, removed),
+                joined_kind,
+                joined: two(side, joined_kind, joined),
+                price,
+            },
         }
     }
 }

@@ -9,7 +9,7 @@
 //! Cost: a start takes a few hundred gradient steps, each O(I_target I_source) for I incidences.
 
 use super::discrete::Discrete;
-use super::multistart::{MatchSettings, Maximum, maximise};
+use super::multistart::{MatchSettings, Maximum, maximise, polish};
 use super::objective::HypergraphObjective;
 use super::starts::StartKind;
 use crate::canonical::Canonical;
@@ -114,6 +114,16 @@ pub(crate) fn match_as_stored(
     let objective = HypergraphObjective::new(problem);
     let columns: Vec<_> = hypotheses.iter().map(columns_of).collect();
     report(problem, maximise(&objective, &columns, settings))
+}
+
+/// A map polished by block ascent and local search: never dearer than it was.
+pub(crate) fn polished(problem: &MatchingProblem, map: &ElementMap, settings: &MatchSettings) -> ElementMap {
+    let objective = HypergraphObjective::new(problem);
+    map_of(&polish(
+        &objective,
+        Discrete::from_columns(&objective, &columns_of(map)),
+        settings,
+    ))
 }
 
 fn columns_of(map: &ElementMap) -> Vec<Vec<Option<usize>>> {

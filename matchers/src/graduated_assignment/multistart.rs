@@ -196,7 +196,8 @@ fn kick(objective: &impl Objective, best: &mut Discrete, settings: &MatchSetting
     }
 }
 
-fn polish(objective: &impl Objective, mut state: Discrete, settings: &MatchSettings) -> Discrete {
+/// Block ascent and local search in turn until neither helps.
+pub fn polish(objective: &impl Objective, mut state: Discrete, settings: &MatchSettings) -> Discrete {
     loop {
         let mut improved = state.ascend(objective);
         improved |= state.local_search(objective, settings.max_moves);
