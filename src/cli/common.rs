@@ -4,7 +4,8 @@ use super::Failure;
 use clap::{Args, ValueEnum};
 use medial_scaffold::fine_scaffold;
 use medial_scaffold::geometry::Length;
-use medial_scaffold::input::{self, ReadSettings, Shape, read_shape};
+use medial_scaffold::input::repair::{RepairSettings, repair};
+use medial_scaffold::input::{self, Geometry, ReadSettings, Shape, read_shape};
 use medial_scaffold::pipeline::ScaffoldSettings;
 use serde::Serialize;
 use std::path::Path;
@@ -58,6 +59,10 @@ pub struct Common {
     /// Label to take from a segmentation mask with several.
     #[arg(long, value_name = "N", global = true, help_heading = "Input")]
     pub label: Option<i32>,
+
+    /// Mend meshes before use: join equal points, drop useless faces, turn faces outward; what was changed is listed.
+    #[arg(long, global = true, help_heading = "Input")]
+    pub repair: bool,
 
     /// Spacing at which a known surface is sampled: 0.5mm, 1%diag.
     #[arg(long, value_name = "LEN", global = true, help_heading = "Method")]
@@ -148,7 +153,19 @@ impl Common {
             label: self.label,
             ..ReadSettings::default()
         };
-        Ok(read_shape(path, &settings)?)
+        let mut shape = read_shape(path, &settings)?;
+        if let (true, Geometry::Mesh(mesh)) = (self.repair, &mut shape.geometry) {
+            let repaired = repair(mesh, &RepairSettings::default());
+            *mesh = repaired.mesh;
+            shape.warnings.extend(
+                repaired
+                    .changes
+                    .lines()
+                    .into_iter()
+                    .map(|line| format!("repaired: {line}")),
+            );
+        }
+        Ok(shape)
     }
 
     /// Settings of every stage for one side, as these options say.

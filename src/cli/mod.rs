@@ -11,6 +11,7 @@ mod run_record;
 mod check;
 mod match_command;
 mod mesh;
+mod report;
 mod scaffold;
 
 use clap::{Parser, Subcommand};
@@ -39,6 +40,8 @@ enum Command {
     Scaffold(scaffold::ScaffoldArgs),
     /// Correspondences, rigid transform and shape difference of two shapes.
     Match(match_command::MatchArgs),
+    /// The page of a result folder, made again from its JSON.
+    Report(report::ReportArgs),
 }
 
 /// Why a command did not end well: the message, what to do about it, and the exit code.
@@ -100,6 +103,7 @@ pub fn main() -> ExitCode {
         Command::Mesh(args) => mesh::run(args, common),
         Command::Scaffold(args) => scaffold::run(args, common),
         Command::Match(args) => match_command::run(args, common),
+        Command::Report(args) => report::run(args, common),
     };
     match done {
         Ok(Verdict::Fine) => ExitCode::SUCCESS,
