@@ -42,10 +42,12 @@ pub mod coarse_scaffold;
 
 pub mod measures;
 
-pub mod reports;
-
 pub mod matching;
 
 pub mod registration;
+
+pub mod change;
+
+pub mod reports;
 
 pub mod pipeline;

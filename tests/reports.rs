@@ -315,3 +315,73 @@ fn glb_holds_named_layers_and_reads_back() {
         assert!(reports::scene_from_glb(&bytes[..cut]).is_err(), "cut at {cut}");
     }
 }
+
+/// What `scaffold.json` says of the two squares.
+fn scaffold_json() -> serde_json::Value {
+    let mut s = serde_json::to_value(scaffold()).expect("JSON");
+    s["name"] = "two <squares>".into();
+    s["counts"] = serde_json::json!({"nodes": 2, "axial_curves": 1, "rib_curves": 2, "sheets": 2});
+    s["topology"] = serde_json::json!({"solid_betti": [1, 0, 0], "scaffold_betti": [1, 0, 0], "agree": true});
+    s
+}
+
+fn scaffold_scene() -> Scene {
+    let mut scene = Scene::default();
+    let mut mesh = tetrahedron();
+    mesh.points[2].z = 1.0;
+    scene.add_surface("", &mesh, [0.9, 0.85, 0.8, 1.0], None);
+    scene.add_scaffold("", &scaffold(), &Rigid::IDENTITY);
+    scene
+}
+
+#[test]
+fn a_page_holds_its_data_and_is_rebuilt_from_the_files_alone() {
+    let folder = Folder::new();
+    let (result, run) = (
+        scaffold_json(),
+        serde_json::json!({"seed": 0, "warnings": ["mind the gap", "mind the gap"]}),
+    );
+    let report =
+        reports::scaffold_report("two <squares>", &result, &run, scaffold_scene()).expect("a report");
+    let page = report.html().expect("a page");
+    assert_eq!(page, report.html().expect("a page"), "same report, same bytes");
+    assert!(page.contains("two &lt;squares&gt;") && !page.contains("<squares>"));
+    assert_eq!(
+        page.matches("mind the gap").count(),
+        3,
+        "once as a note, twice in the record"
+    );
+    for id in ["result", "run", "view-settings", "scene-glb"] {
+        assert!(page.contains(&format!("id=\"{id}\"")), "{id}");
+    }
+    assert!(!page.contains("src=\"http") && !page.contains("href=\"http"));
+
+    reports::write_json(&folder.file("scaffold.json"), &result).expect("writes");
+    reports::write_json(&folder.file("run.json"), &run).expect("writes");
+    let dir = folder.dir.path();
+    let bare = reports::rebuild(dir).expect("rebuilds without a scene");
+    assert!(bare.notes.iter().any(|n| n.text.contains("scene.glb")));
+    reports::write_bytes(&folder.file("scene.glb"), reports::glb_bytes(&scaffold_scene())).expect("writes");
+    let again = reports::rebuild(dir).expect("rebuilds");
+    assert_eq!(again.title, "two <squares>");
+    assert_eq!((again.sections, again.figures), (report.sections, report.figures));
+
+    std::fs::write(folder.file("scaffold.json"), "{").expect("writes");
+    assert!(
+        reports::rebuild(dir)
+            .expect_err("damaged")
+            .to_string()
+            .contains("scaffold.json")
+    );
+    let empty = Folder::new();
+    assert!(
+        reports::rebuild(empty.dir.path())
+            .expect_err("empty")
+            .to_string()
+            .contains("change.json")
+    );
+    let mut cut = result;
+    cut.as_object_mut().expect("an object").remove("counts");
+    let error = reports::scaffold_report("x", &cut, &run, Scene::default()).expect_err("no counts");
+    assert!(error.to_string().contains("counts.sheets"), "{error}");
+}

@@ -3,11 +3,100 @@
 //! In: `change.json`, `run.json` and a scene with surfaces of the shapes `baseline` and `followup` (the baseline carrying its
 //! growth as a signed quantity). Out: a [`Report`].
 
-use super::facts::{at, items, number, run_section, shown, text};
+use super::atomic::WriteError;
+use super::colour;
+use super::facts::{at, items, number, run_section, shown};
+use super::mesh_files::{PlyEncoding, VertexField, write_ply};
 use super::page::{KeyFigure, NoteLevel, Plot, Report, ReportError, Section, Table};
 use super::plot::{IntervalRow, interval_plot, pretty, signed};
-use super::scene::Scene;
-use serde_json::Value;
+use super::scene::{Layer, LayerKind, Quantity, Scene};
+use crate::change::{Change, LesionChange};
+use serde_json::{Map, Value, json};
+use std::path::Path;
+
+/// The scene of a change: baseline surfaces coloured by growth on one scale, follow-up surfaces to be switched on, new and
+/// vanished lesions plain.
+pub fn change_scene(change: &Change) -> Scene {
+    let mut scene = Scene::default();
+    let all: Vec<f32> = change
+        .lesions
+        .iter()
+        .flat_map(|l| l.growth_map.displacement_mm.iter().map(|h| *h as f32))
+        .collect();
+    let range = Quantity::signed("growth", "mm", all).range;
+    let mut add = |what: &str, label: i32, shape: &str, mesh, colour, quantity, visible| {
+        let mut properties = Map::new();
+        properties.insert("label".to_owned(), json!(label));
+        scene.layers.push(Layer {
+            name: format!("{what} {label}"),
+            kind: LayerKind::Surface,
+            shape: shape.to_owned(),
+            mesh,
+            colour,
+            quantity,
+            properties,
+            visible,
+        });
+    };
+    for l in &change.lesions {
+        let values = l.growth_map.displacement_mm.iter().map(|h| *h as f32).collect();
+        let mut growth = Quantity::signed("growth", "mm", values);
+        growth.range = range;
+        let mesh = l.growth_map.mesh.clone();
+        add(
+            "baseline",
+            l.label,
+            "baseline",
+            mesh,
+            colour::BONE,
+            Some(growth),
+            true,
+        );
+        let mesh = l.followup_surface.clone();
+        add(
+            "follow-up",
+            l.label,
+            "followup",
+            mesh,
+            colour::SECOND,
+            None,
+            false,
+        );
+    }
+    for l in &change.vanished {
+        add(
+            "vanished",
+            l.label,
+            "baseline",
+            l.surface.clone(),
+            colour::BONE,
+            None,
+            true,
+        );
+    }
+    for l in &change.new {
+        add(
+            "new",
+            l.label,
+            "followup",
+            l.surface.clone(),
+            colour::SECOND,
+            None,
+            false,
+        );
+    }
+    scene
+}
+
+/// Writes a lesion's growth map (`growth_<label>.ply`): baseline surface with `growth` a vertex, mm, outward positive.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_growth(path: &Path, lesion: &LesionChange) -> Result<(), WriteError> {
+    let map = &lesion.growth_map;
+    let growth = VertexField::real("growth", map.displacement_mm.clone());
+    write_ply(path, &map.mesh, &[growth], PlyEncoding::Binary)
+}
 
 /// The report of a change.
 ///
@@ -157,10 +246,9 @@ fn changes(change: &Value) -> Section {
 }
 
 /// Fields of a lesion at one date, with names and units.
-const MEASURES: [(&str, &str, &str); 15] = [
+const MEASURES: [(&str, &str, &str); 14] = [
     ("volume_mesh", "volume, marching cubes at 0.5", "mm\u{b3}"),
     ("volume_voxel", "volume, voxel count", "mm\u{b3}"),
-    ("volume_smooth", "volume, smoothed surface", "mm\u{b3}"),
     ("volume_scaffold", "volume, scaffold's surface", "mm\u{b3}"),
     ("area", "surface area, marching cubes", "mm\u{b2}"),
     ("area_smooth", "surface area, smoothed surface", "mm\u{b2}"),
@@ -259,19 +347,21 @@ fn responses(change: &Value) -> Section {
     );
     for l in items(change, "lesions") {
         let word = |criterion: &str| {
-            at(l, &format!("response.{criterion}")).map_or_else(
-                || "-".to_owned(),
-                |v| at(v, "category").map_or_else(|| text(v), text),
-            )
+            let at = |field: &str| format!("response.{criterion}.{field}");
+            let percent =
+                number(l, &at("percent")).map_or_else(String::new, |p| format!(" ({} %)", signed(p)));
+            let small = super::facts::at(l, &at("measurable")).and_then(Value::as_bool) == Some(false);
+            let remark = if small { ", too small to be measurable" } else { "" };
+            format!("{}{percent}{remark}", shown(l, &at("category")))
         };
         table.row([name(l), word("recist"), word("rano"), word("volumetric")]);
     }
     if let Some(r) = at(change, "totals.response") {
         table.row([
             "all lesions".to_owned(),
-            shown(r, "recist"),
-            shown(r, "rano"),
-            shown(r, "volumetric"),
+            shown(r, "recist.category"),
+            shown(r, "rano.category"),
+            shown(r, "volumetric.category"),
         ]);
     }
     if !table.rows.is_empty() {
@@ -302,10 +392,11 @@ fn growth(change: &Value) -> Section {
         &[
             ":lesion",
             ":part",
-            "baseline [mm\u{b3}]",
-            "follow-up [mm\u{b3}]",
             "change [mm\u{b3}]",
             "share of change [%]",
+            "area [mm\u{b2}]",
+            "mean displacement [mm]",
+            "change of mean radius [mm]",
         ],
     );
     for l in items(change, "lesions") {
@@ -320,10 +411,11 @@ fn growth(change: &Value) -> Section {
             parts.row([
                 name(l),
                 shown(p, "name"),
-                shown(p, "baseline_mm3"),
-                shown(p, "followup_mm3"),
                 number(p, "change_mm3").map_or_else(|| "-".to_owned(), signed),
                 shown(p, "share_percent"),
+                shown(p, "area_mm2"),
+                number(p, "mean_displacement_mm").map_or_else(|| "-".to_owned(), signed),
+                number(p, "radius_change_mm").map_or_else(|| "-".to_owned(), signed),
             ]);
         }
     }
@@ -346,7 +438,16 @@ fn unpaired(change: &Value) -> Section {
         ("merged", "Merged"),
     ] {
         for l in items(change, key) {
-            section.paragraphs.push(format!("{word}: {}.", text(l)));
+            let sentence = if number(l, "label").is_some() {
+                format!("{word}: {}, {} mm\u{b3}.", name(l), shown(l, "volume_best"))
+            } else {
+                format!(
+                    "{word}: {} at baseline, {} at follow-up.",
+                    shown(l, "baseline"),
+                    shown(l, "followup")
+                )
+            };
+            section.paragraphs.push(sentence);
         }
     }
     section

@@ -8,7 +8,8 @@
 //! - [`colour`], [`scene`], [`glb`]: what is shown in 3D, as layers and as binary glTF;
 //! - [`still`], [`plot`]: pictures without a GPU, plots as SVG;
 //! - [`page`]: one offline HTML page with viewer, tables and data inside;
-//! - [`facts`], [`scaffold_report`], [`match_report`], [`change_report`]: the pages of the commands, from their JSON.
+//! - [`facts`], [`scaffold_report`], [`match_report`], [`change_report`]: the pages of the commands, from their JSON;
+//! - [`rebuild`]: a page again from the files of a run.
 //!
 //! Coordinates are LPS mm in every file, and every format that can say so does. Bytes depend on the data alone.
 
@@ -22,13 +23,14 @@ pub mod medial_files;
 pub mod mesh_files;
 pub mod page;
 pub mod plot;
+pub mod rebuild;
 pub mod scaffold_report;
 pub mod scene;
 pub mod still;
 pub mod vtp;
 
 pub use atomic::{WriteError, write_atomically, write_bytes, write_json};
-pub use change_report::change_report;
+pub use change_report::{change_report, change_scene, write_growth};
 pub use glb::{glb_bytes, scene_from_glb};
 pub use match_report::match_report;
 pub use medial_files::{MedialMesh, write_csv, write_ma, write_tfm};
@@ -36,6 +38,7 @@ pub use mesh_files::{
     FieldValues, PlyEncoding, VertexField, write_mesh, write_obj, write_off, write_ply, write_stl,
 };
 pub use page::{KeyFigure, NoteLevel, Plot, Report, ReportError, Section, Table};
+pub use rebuild::rebuild;
 pub use scaffold_report::scaffold_report;
 pub use scene::{CorrespondenceLine, Layer, LayerKind, Quantity, Scene};
 pub use still::View;

@@ -251,12 +251,12 @@ pub struct Report {
 const STILL_SIZE: [usize; 2] = [1200, 760];
 
 impl Report {
-    /// Adds a note.
+    /// Adds a note, once.
     pub fn note(&mut self, level: NoteLevel, text: impl Into<String>) {
-        self.notes.push(Note {
-            level,
-            text: text.into(),
-        });
+        let text = text.into();
+        if self.notes.iter().all(|n| n.text != text) {
+            self.notes.push(Note { level, text });
+        }
     }
 
     /// Adds a section unless it is empty.

@@ -40,7 +40,7 @@ pub struct Marker {
     pub label: String,
 }
 
-/// A chart with linear axes.
+/// A chart; y is linear, x linear or logarithmic.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Chart {
     /// What the picture shows, also its text for readers who cannot see it.
@@ -53,6 +53,8 @@ pub struct Chart {
     pub series: Vec<Series>,
     /// Vertical lines.
     pub markers: Vec<Marker>,
+    /// Logarithmic x; points with x not above 0 are left out.
+    pub log_x: bool,
 }
 
 /// Text safe inside an XML element or a quoted attribute.
@@ -110,6 +112,14 @@ pub fn pretty(x: f64) -> String {
     if text == "-0" { "0".to_owned() } else { text }
 }
 
+/// 1, 2 and 5 times powers of ten between two logarithms.
+fn log_ticks(range: [f64; 2]) -> Vec<f64> {
+    let powers = range[0].floor() as i32..=range[1].ceil() as i32;
+    let all = powers.flat_map(|p| [1.0, 2.0, 5.0].map(|m| m * 10f64.powi(p)));
+    all.filter(|t| (range[0]..=range[1]).contains(&t.log10()))
+        .collect()
+}
+
 const WIDTH: f64 = 560.0;
 const HEIGHT: f64 = 300.0;
 const LEFT: f64 = 58.0;
@@ -121,6 +131,7 @@ const BOTTOM: f64 = 46.0;
 struct Frame {
     x: [f64; 2],
     y: [f64; 2],
+    log_x: bool,
 }
 
 impl Frame {
@@ -134,14 +145,18 @@ impl Frame {
         };
         let (mut x, mut y) = ([f64::INFINITY, f64::NEG_INFINITY], [0f64, f64::NEG_INFINITY]);
         for p in all() {
-            x = [x[0].min(p[0]), x[1].max(p[0])];
+            let at = if chart.log_x { p[0].log10() } else { p[0] };
+            if at.is_finite() {
+                x = [x[0].min(at), x[1].max(at)];
+            }
             y = [y[0].min(p[1]), y[1].max(p[1])];
         }
         for s in chart.series.iter().filter(|s| s.style == SeriesStyle::Bars) {
             x = [x[0] - 0.5 * bar_gap(s), x[1] + 0.5 * bar_gap(s)];
         }
         for m in &chart.markers {
-            x = [x[0].min(m.x), x[1].max(m.x)];
+            let at = if chart.log_x { m.x.log10() } else { m.x };
+            x = [x[0].min(at), x[1].max(at)];
         }
         if x[0] > x[1] {
             x = [0.0, 1.0];
@@ -155,10 +170,15 @@ impl Frame {
             y[1] = y[0] + 1.0;
         }
         y[1] += 0.06 * (y[1] - y[0]);
-        Self { x, y }
+        Self {
+            x,
+            y,
+            log_x: chart.log_x,
+        }
     }
 
     fn px(&self, x: f64) -> f64 {
+        let x = if self.log_x { x.log10() } else { x };
         LEFT + (x - self.x[0]) / (self.x[1] - self.x[0]) * (WIDTH - LEFT - RIGHT)
     }
 
@@ -225,10 +245,13 @@ impl Chart {
                 pretty(t)
             );
         }
-        for t in ticks(frame.x[0], frame.x[1], 7)
-            .into_iter()
-            .filter(|t| keep(whole(0), *t))
-        {
+        let x_ticks: Vec<f64> = if self.log_x {
+            log_ticks(frame.x)
+        } else {
+            let round = ticks(frame.x[0], frame.x[1], 7);
+            round.into_iter().filter(|t| keep(whole(0), *t)).collect()
+        };
+        for t in x_ticks {
             let x = frame.px(t);
             let _ = write!(
                 out,
@@ -296,7 +319,10 @@ fn bar_gap(s: &Series) -> f64 {
 
 fn draw_series(frame: &Frame, s: &Series, out: &mut String) {
     let colour = escape(&s.colour);
-    let finite = s.points.iter().filter(|p| p[0].is_finite() && p[1].is_finite());
+    let finite = s
+        .points
+        .iter()
+        .filter(|p| p[0].is_finite() && p[1].is_finite() && (!frame.log_x || p[0] > 0.0));
     let points: Vec<[f64; 2]> = finite.map(|p| [frame.px(p[0]), frame.py(p[1])]).collect();
     match s.style {
         SeriesStyle::Line | SeriesStyle::Step => {

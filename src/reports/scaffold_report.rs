@@ -167,13 +167,14 @@ fn simplification(s: &Value, tolerance: f64) -> Section {
     }
     let chart = Chart {
         title: "Elements kept at each tolerance".to_owned(),
-        x_label: "tolerance [mm]".to_owned(),
+        x_label: "tolerance [mm], logarithmic".to_owned(),
         y_label: "elements kept".to_owned(),
         series,
         markers: vec![Marker {
             x: tolerance,
             label: format!("this run, {} mm", pretty(tolerance)),
         }],
+        log_x: from > 0.0,
     };
     section.plots.push(Plot {
         svg: chart.svg(),
@@ -194,7 +195,7 @@ fn simplification(s: &Value, tolerance: f64) -> Section {
                 style: SeriesStyle::Bars,
                 points: shares,
             }],
-            markers: Vec::new(),
+            ..Chart::default()
         };
         section.plots.push(Plot {
             svg: chart.svg(),

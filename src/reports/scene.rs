@@ -353,7 +353,7 @@ fn curve_layer(
 ) -> Layer {
     let (word, kind, colour, width) = match c.kind {
         CurveKind::Axial => ("axial", LayerKind::Axial, colour::AXIAL, 0.0042),
-        CurveKind::Rib => ("rib", LayerKind::Rib, colour::RIB, 0.0026),
+        CurveKind::Rib => ("rib", LayerKind::Rib, colour::RIB, 0.0019),
         CurveKind::Wire => ("wire", LayerKind::Wire, colour::WIRE, 0.0042),
         CurveKind::Seam => ("seam", LayerKind::Seam, colour::SEAM, 0.0032),
     };

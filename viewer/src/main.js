@@ -67,9 +67,9 @@ class Viewer {
     if (this.box.isEmpty()) this.box.set(new THREE.Vector3(-1, -1, -1), new THREE.Vector3(1, 1, 1));
     this.radius = 0.5 * this.box.getSize(new THREE.Vector3()).length();
     const hasInside = this.layers.some((l) => l.kind !== 'surface');
-    const surfaces = this.layers.filter((l) => l.kind === 'surface').length;
-    this.clarity = hasInside ? 0.3 : surfaces > 1 ? 0.5 : 1;
-    if (this.settings.surface_colours) this.surfaceColours = this.settings.surface_colours;
+    const surfaces = this.layers.filter((l) => l.kind === 'surface' && l.data.visible !== false).length;
+    this.surfaceColours = this.settings.surface_colours ?? '';
+    this.clarity = hasInside ? 0.3 : surfaces > 1 && !this.surfaceColours ? 0.5 : 1;
     this.buildPanel();
     this.apply();
     this.home();

@@ -1,0 +1,54 @@
+//! Settings of the change stage.
+
+use serde::{Deserialize, Serialize};
+
+/// How lesions of the two dates are paired.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Pairing {
+    /// Equal labels are the same lesion.
+    #[default]
+    Label,
+    /// Connected components that overlap in the world frame are the same lesion; labels are ignored.
+    Overlap,
+}
+
+/// Settings of [`super::change`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ChangeSettings {
+    /// How lesions are paired.
+    pub pairing: Pairing,
+    /// Only this label of label maps; every label but 0 when not given.
+    pub label: Option<i32>,
+    /// Standard deviation of the boundary's position, mm, the same all over a lesion and independent between dates. When not
+    /// given: a voxel's size (geometric mean) over the square root of 12, the spread of a boundary known to a voxel; for a
+    /// mesh its mean edge length instead of a voxel.
+    pub boundary_sd_mm: Option<f64>,
+    /// Coefficient of variation of a lesion's volume under repeated segmentation, 0.05 for 5 %. Replaces the boundary term.
+    pub repeat_cv: Option<f64>,
+    /// Tolerance of the surface Dice coefficient, mm. 1 mm is the smallest of those used for organs by Nikolov et al. 2018.
+    pub surface_dice_tolerance_mm: f64,
+    /// Standard deviation of the smoothing kernel that turns a mask into a smooth surface, voxels along each axis. At 0.9 steps
+    /// of one voxel nearly vanish and structures of three voxels stay.
+    pub smoothing_vox: f64,
+    /// A patch of the surface counts as changed when it moved by more than this many boundary standard deviations.
+    pub patch_threshold_sd: f64,
+    /// Components of fewer voxels are not lesions (pairing by overlap only); 0 keeps all.
+    pub least_voxels: usize,
+}
+
+impl Default for ChangeSettings {
+    fn default() -> Self {
+        Self {
+            pairing: Pairing::Label,
+            label: None,
+            boundary_sd_mm: None,
+            repeat_cv: None,
+            surface_dice_tolerance_mm: 1.0,
+            smoothing_vox: 0.9,
+            patch_threshold_sd: 2.0,
+            least_voxels: 0,
+        }
+    }
+}
