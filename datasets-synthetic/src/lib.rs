@@ -19,17 +19,26 @@
 //! assert_eq!(moved.len(), 1_000);
 //! ```
 
+pub mod bones;
 pub mod cloud;
+pub mod dataset;
 pub mod deform;
 pub mod implicit;
+pub mod masks;
 pub mod mesh;
+pub mod nifti;
+pub mod ply;
+pub mod population;
+pub mod registry;
 pub mod sampling;
 pub mod shapes;
 pub mod truth;
 
 pub use cloud::Cloud;
+pub use dataset::{Dataset, DatasetSettings, generate, write_dataset};
 pub use deform::{RigidMotion, Warp, rigid};
 pub use mesh::{Bounds, MeshTopology, TriangleMesh};
+pub use registry::ShapeKind;
 pub use sampling::{
     add_noise, add_outliers, mean_spacing, sample_density_gradient, sample_poisson, sample_uniform,
 };

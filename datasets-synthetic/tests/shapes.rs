@@ -97,6 +97,26 @@ fn mesh_volume_and_area_converge_to_the_analytic_values() {
     }
 }
 
+/// A warp that keeps volume takes the analytic value away, so that the extrapolated one can be compared with it.
+#[test]
+fn extrapolated_volumes_are_accurate() {
+    for (shape, tolerance) in [
+        (shapes::ellipsoid(3.0, 2.0, 1.0), 5e-5),
+        (shapes::torus(3.0, 1.0), 5e-5),
+        (shapes::three_lobed_blob(), 2e-4),
+    ] {
+        let volume = shape.truth.volume_mm3.expect("known");
+        let twisted = shape.warped(&datasets_synthetic::Warp::Twist { rate: 0.02 });
+        assert_eq!(twisted.truth.volume_mm3, None);
+        let found = twisted.volume_mm3().expect("a solid");
+        assert!(
+            (found / volume - 1.0).abs() < tolerance,
+            "{}: {found} against {volume}",
+            shape.name
+        );
+    }
+}
+
 /// Second way: the volume of the implicit solid by counting lattice points inside.
 #[test]
 fn lattice_volume_agrees_with_the_analytic_volume() {
@@ -229,6 +249,14 @@ fn analytic_medial_points_have_two_closest_surface_points() {
                 cloud.points.push(
                     2.0 / 3f64.sqrt() * t.cos() * DVec3::new(a.cos(), a.sin(), 0.0) + t.sin() * DVec3::Z,
                 );
+            }
+        }
+        if shape.name == "dumbbell" {
+            for k in 0..800 {
+                // The two reflex circles, the ends of the neck: at 4 - sqrt(4 - 0.64) from the middle.
+                let a = std::f64::consts::TAU * k as f64 / 400.0;
+                let x = (4.0 - (4f64 - 0.64).sqrt()) * if k < 400 { 1.0 } else { -1.0 };
+                cloud.points.push(DVec3::new(x, 0.8 * a.cos(), 0.8 * a.sin()));
             }
         }
         let spacing = (shape.mesh(8_000).area() / 40_000.0).sqrt();

@@ -31,8 +31,10 @@ pub enum Field {
         axes: DMat3,
         /// Half lengths along the axes, mm.
         radii: DVec3,
-        /// Exponent, at least 1.
+        /// Exponent, at least 1; multiples of one half are the fastest.
         power: f64,
+        /// Geometric mean of the radii, mm: makes the gradient about one in the mean over directions.
+        mean_radius: f64,
     },
     /// Axis-aligned box; exact.
     Box {
@@ -108,6 +110,24 @@ pub enum Field {
         /// Outward distance, mm.
         distance: f64,
     },
+    /// Scaled along the coordinate axes, then shifted; the value is scaled by the mean factor.
+    Stretched {
+        /// What is stretched.
+        of: Arc<Field>,
+        /// Factor along each axis.
+        scale: DVec3,
+        /// Shift afterwards, mm.
+        shift: DVec3,
+        /// Geometric mean of the factors.
+        mean_factor: f64,
+    },
+    /// The surface made gently uneven: plane waves are added to the field.
+    Relief {
+        /// What is made uneven.
+        of: Arc<Field>,
+        /// Waves: vector [rad/mm], phase [rad] and amplitude [mm].
+        waves: Arc<Vec<(DVec3, f64, f64)>>,
+    },
     /// The image of a solid under a smooth map.
     Warped {
         /// The solid before.
@@ -134,6 +154,7 @@ impl Field {
             axes,
             radii,
             power,
+            mean_radius: (radii.x * radii.y * radii.z).cbrt(),
         }
     }
 
@@ -142,6 +163,17 @@ impl Field {
         Field::Tube {
             centreline: Arc::new(vec![a, b]),
             radius,
+        }
+    }
+
+    /// Scaled along the coordinate axes, then shifted.
+    pub fn stretched(self, scale: DVec3, shift: DVec3) -> Self {
+        let mean_factor = (scale.x * scale.y * scale.z).cbrt();
+        Field::Stretched {
+            of: Arc::new(self),
+            scale,
+            shift,
+            mean_factor,
         }
     }
 
@@ -205,6 +237,19 @@ impl Field {
             }
             Field::Outside(of) => -of.value(p),
             Field::Offset { of, distance } => of.value(p) - distance,
+            Field::Stretched {
+                of,
+                scale,
+                shift,
+                mean_factor,
+            } => mean_factor * of.value((p - shift) / scale),
+            Field::Relief { of, waves } => {
+                of.value(p)
+                    + waves
+                        .iter()
+                        .map(|(k, phase, a)| a * (k.dot(p) + phase).sin())
+                        .sum::<f64>()
+            }
             Field::Warped { of, warp } => of.value(warp.inverse(p)),
             Field::Star(star) => p.length() - star.radius(p),
             _ => self.primitive(p).value,
@@ -231,6 +276,27 @@ impl Field {
                     value: s.value - distance,
                     gradient: s.gradient,
                 }
+            }
+            Field::Stretched {
+                of,
+                scale,
+                shift,
+                mean_factor,
+            } => {
+                let s = of.sample((p - shift) / scale);
+                FieldSample {
+                    value: mean_factor * s.value,
+                    gradient: *mean_factor * s.gradient / scale,
+                }
+            }
+            Field::Relief { of, waves } => {
+                let mut s = of.sample(p);
+                for (k, phase, a) in waves.iter() {
+                    let (sin, cos) = (k.dot(p) + phase).sin_cos();
+                    s.value += a * sin;
+                    s.gradient += *k * (a * cos);
+                }
+                s
             }
             Field::Warped { of, warp } => {
                 let q = warp.inverse(p);
@@ -292,7 +358,8 @@ impl Field {
                 axes,
                 radii,
                 power,
-            } => superellipsoid(p - centre, axes, *radii, *power),
+                mean_radius,
+            } => superellipsoid(p - centre, axes, *radii, *power, *mean_radius),
             Field::Box { min, max } => axis_box(p, *min, *max),
             Field::HalfSpace { normal, offset } => FieldSample {
                 value: normal.dot(p) - offset,
@@ -348,24 +415,25 @@ fn tube(p: DVec3, centreline: &[DVec3], radius: f64) -> FieldSample {
     distance_to(p, best.1, radius)
 }
 
-fn superellipsoid(p: DVec3, axes: &DMat3, radii: DVec3, power: f64) -> FieldSample {
+fn superellipsoid(p: DVec3, axes: &DMat3, radii: DVec3, power: f64, scale: f64) -> FieldSample {
     let q = axes.transpose() * p / radii;
-    // The geometric mean radius makes the gradient about one in the mean over directions.
-    let scale = (radii.x * radii.y * radii.z).cbrt();
     let (norm, slope) = if power == 2.0 {
         let n = q.length();
         (n, if n > 0.0 { q / n } else { DVec3::ZERO })
     } else {
-        let a = q.abs();
-        let n = (a.x.powf(power) + a.y.powf(power) + a.z.powf(power)).powf(1.0 / power);
-        let g = |x: f64| {
-            if n > 0.0 {
-                x.signum() * (x.abs() / n).powf(power - 1.0)
-            } else {
-                0.0
-            }
-        };
-        (n, DVec3::new(g(q.x), g(q.y), g(q.z)))
+        let powers = DVec3::new(
+            half_power(q.x.abs(), power),
+            half_power(q.y.abs(), power),
+            half_power(q.z.abs(), power),
+        );
+        let sum = powers.element_sum();
+        let n = sum.powf(1.0 / power);
+        // d n / d q = (|q| / n)^(power - 1) sign q = |q|^power / q * n / sum.
+        let slope = |x: f64, xp: f64| if x != 0.0 { xp / x * (n / sum) } else { 0.0 };
+        (
+            n,
+            DVec3::new(slope(q.x, powers.x), slope(q.y, powers.y), slope(q.z, powers.z)),
+        )
     };
     let gradient = *axes * (slope / radii) * scale;
     let gradient = if gradient == DVec3::ZERO {
@@ -376,6 +444,19 @@ fn superellipsoid(p: DVec3, axes: &DMat3, radii: DVec3, power: f64) -> FieldSamp
     FieldSample {
         value: scale * (norm - 1.0),
         gradient,
+    }
+}
+
+/// `x^power` for `x >= 0`, without the general power function when `2 power` is a whole number.
+fn half_power(x: f64, power: f64) -> f64 {
+    let whole = power.floor();
+    let part = power - whole;
+    if part == 0.0 {
+        x.powi(whole as i32)
+    } else if part == 0.5 {
+        x.powi(whole as i32) * x.sqrt()
+    } else {
+        x.powf(power)
     }
 }
 
