@@ -10,9 +10,13 @@
 //! 3. **Star**: one new tetrahedron a boundary facet, linked to its siblings through a table indexed by the two local
 //!    vertex numbers of an edge.
 //!
+//! Several threads may insert at once (see `parallel`): a cavity and the tetrahedra around it are taken before anything is
+//! written, and an insertion that meets one taken by another thread gives up and comes again later.
+//!
 //! Cost: expected `O(n)` after sorting for points spread evenly or on surfaces; `O(n^2)` tetrahedra in the worst case.
 
-use crate::geometry::predicates::{insphere_perturbed, orient3d};
+use super::filter::Filter;
+use super::store::Store;
 use glam::DVec3;
 
 /// The vertex at infinity while building.
@@ -24,6 +28,9 @@ const FACET: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 /// Cavities of more vertices than this are linked by sorting their edges instead of by the table.
 const TABLE: usize = 64;
 
+/// Steps after which a walk among other threads' changes is given up.
+const LONGEST_WALK: usize = 1 << 16;
+
 /// A facet between the cavity and the rest.
 #[derive(Clone, Copy)]
 struct Boundary {
@@ -33,243 +40,380 @@ struct Boundary {
     outside: u32,
 }
 
-/// The triangulation under construction.
-pub(super) struct Builder<'a> {
+/// One thread's means to insert points.
+pub(super) struct Inserter<'a> {
     points: &'a [DVec3],
-    pub(super) vertices: Vec<[u32; 4]>,
-    pub(super) neighbours: Vec<[u32; 4]>,
-    /// Last round a tetrahedron was tested in: `2 * round + conflict`.
-    stamps: Vec<u32>,
-    round: u32,
-    /// Slots of deleted tetrahedra.
-    pub(super) free: Vec<u32>,
+    filter: Filter,
+    /// A tetrahedron near the last insertion.
     last: u32,
+    /// Tetrahedra visited by this insertion, the first `visited` of them.
+    tested: Vec<u32>,
+    visited: usize,
+    /// Those in conflict, the first `inside` of them.
     cavity: Vec<u32>,
+    inside: usize,
+    /// Facets around them, the first `facets` of them.
     boundary: Vec<Boundary>,
+    facets: usize,
     star: Vec<u32>,
-    /// Local number of a vertex, valid when `local[slot[v]] == v`.
+    /// Local number of a vertex, valid when `local[slot[v]] == v`; the infinite vertex has the last place.
     slot: Vec<u8>,
-    local: Vec<u32>,
+    local: [u32; TABLE],
     table: Vec<u32>,
 }
 
-impl<'a> Builder<'a> {
-    /// Starts with the tetrahedron of four points, which must be positively oriented.
-    pub(super) fn new(points: &'a [DVec3], first: [u32; 4]) -> Self {
-        let mut builder = Self {
+/// Puts the first tetrahedron, positively oriented, and its four ghosts into an empty store.
+pub(super) fn first_tetrahedron<S: Store>(store: &mut S, first: [u32; 4]) {
+    let mut tets = vec![first];
+    tets.extend(FACET.map(|facet| {
+        let [a, b, c] = facet.map(|k| first[k]);
+        [a, b, c, INF]
+    }));
+    let mut sides = Vec::new();
+    for v in tets {
+        let tet = store.slot();
+        store.set_tet(tet, v);
+        store.release(tet);
+        for (k, facet) in FACET.iter().enumerate() {
+            let mut key = facet.map(|p| v[p]);
+            key.sort_unstable();
+            sides.push((key, 4 * tet + k as u32));
+        }
+    }
+    sides.sort_unstable();
+    for pair in sides.chunks(2) {
+        store.set_neighbour(pair[0].1, pair[1].1);
+        store.set_neighbour(pair[1].1, pair[0].1);
+    }
+}
+
+impl<'a> Inserter<'a> {
+    /// Inserts `points`, whose tests `filter` makes; the walk begins at `start`.
+    pub(super) fn new(points: &'a [DVec3], filter: Filter, start: u32) -> Self {
+        Self {
             points,
-            vertices: Vec::new(),
-            neighbours: Vec::new(),
-            stamps: Vec::new(),
-            round: 0,
-            free: Vec::new(),
-            last: 0,
+            filter,
+            last: start,
+            tested: Vec::new(),
+            visited: 0,
             cavity: Vec::new(),
+            inside: 0,
             boundary: Vec::new(),
+            facets: 0,
             star: Vec::new(),
-            slot: vec![0; points.len()],
-            local: Vec::new(),
+            slot: vec![0; points.len() + 1],
+            local: [0; TABLE],
             table: vec![0; TABLE * TABLE],
-        };
-        builder.vertices.push(first);
-        for facet in FACET {
-            let [a, b, c] = facet.map(|k| first[k]);
-            builder.vertices.push([a, b, c, INF]);
         }
-        builder.stamps = vec![0; 5];
-        builder.neighbours = vec![[0; 4]; 5];
-        let mut sides = Vec::new();
-        for (t, v) in builder.vertices.iter().enumerate() {
-            for (k, facet) in FACET.iter().enumerate() {
-                let mut key = facet.map(|p| v[p]);
-                key.sort_unstable();
-                sides.push((key, 4 * t as u32 + k as u32));
-            }
-        }
-        sides.sort_unstable();
-        for pair in sides.chunks(2) {
-            builder.link(pair[0].1, pair[1].1);
-        }
-        builder
     }
 
-    #[inline]
-    fn link(&mut self, a: u32, b: u32) {
-        self.neighbours[(a >> 2) as usize][(a & 3) as usize] = b;
-        self.neighbours[(b >> 2) as usize][(b & 3) as usize] = a;
+    /// A tetrahedron near the last insertion.
+    pub(super) fn last(&self) -> u32 {
+        self.last
     }
 
-    #[inline]
+    #[inline(always)]
     fn point(&self, v: u32) -> DVec3 {
         self.points[v as usize]
     }
 
-    /// Inserts a point that is not yet a vertex.
-    pub(super) fn insert(&mut self, v: u32) {
-        let p = self.point(v);
-        let start = self.locate(p);
-        self.find_cavity(start, p);
-        self.fill(v);
+    #[inline(always)]
+    fn corners(&self, v: [u32; 4]) -> [DVec3; 4] {
+        [
+            self.point(v[0]),
+            self.point(v[1]),
+            self.point(v[2]),
+            self.point(v[3]),
+        ]
     }
 
-    /// A tetrahedron that holds the point, or a ghost whose hull triangle it lies beyond.
-    fn locate(&self, p: DVec3) -> u32 {
+    /// Inserts a point that is not yet a vertex; `false`, and nothing changed, when another thread was in the way or the
+    /// store is full.
+    pub(super) fn insert<S: Store>(&mut self, store: &mut S, v: u32) -> bool {
+        let p = self.point(v);
+        store.begin();
+        let Some(start) = self.locate(store, p) else {
+            return false;
+        };
+        if !self.find_cavity(store, start, p) || !store.reserve(self.facets) {
+            self.give_up(store);
+            // The tetrahedron the walk began in may be no more; its old neighbour leads on.
+            self.last = store.neighbour(self.last, 0) >> 2;
+            return false;
+        }
+        self.fill(store, v);
+        true
+    }
+
+    /// A tetrahedron that holds the point, or a ghost whose hull triangle it lies beyond. With one thread there always is
+    /// one; among other threads' changes the walk may lose its way.
+    fn locate<S: Store>(&self, store: &S, p: DVec3) -> Option<u32> {
         let mut tet = self.last;
-        if self.vertices[tet as usize][3] == INF {
-            tet = self.neighbours[tet as usize][3] >> 2;
+        if store.tet(tet)[3] == INF {
+            tet = store.neighbour(tet, 3) >> 2;
         }
         let mut from = 4;
-        'walk: loop {
-            let v = self.vertices[tet as usize];
+        'walk: for _ in 0..LONGEST_WALK.max(self.points.len()) {
+            let v = store.tet(tet);
             if v[3] == INF {
-                return tet;
+                return Some(tet);
             }
-            let corners = v.map(|i| self.point(i));
+            let corners = self.corners(v);
             for k in 0..4 {
                 if k == from {
                     continue;
                 }
-                let [a, b, c] = FACET[k].map(|i| corners[i]);
-                if orient3d(a, b, c, p) > 0.0 {
-                    let next = self.neighbours[tet as usize][k];
+                let [i, j, l] = FACET[k];
+                if self.filter.orient3d(corners[i], corners[j], corners[l], p) > 0.0 {
+                    let next = store.neighbour(tet, k);
                     tet = next >> 2;
                     from = (next & 3) as usize;
                     continue 'walk;
                 }
             }
-            return tet;
+            return Some(tet);
         }
+        None
     }
 
-    fn in_conflict(&self, tet: u32, p: DVec3) -> bool {
-        let v = self.vertices[tet as usize];
-        let [a, b, c] = [v[0], v[1], v[2]].map(|i| self.point(i));
-        if v[3] != INF {
-            return insphere_perturbed(a, b, c, self.point(v[3]), p) > 0.0;
+    #[inline(always)]
+    fn in_conflict<S: Store>(&self, store: &S, tet: u32, p: DVec3) -> bool {
+        let v = store.tet(tet);
+        if v[3] == INF {
+            return self.ghost_in_conflict(store, tet, p);
         }
-        let side = orient3d(a, b, c, p);
-        side > 0.0 || (side == 0.0 && self.in_conflict(self.neighbours[tet as usize][3] >> 2, p))
+        self.filter.insphere(self.corners(v), p) > 0.0
     }
 
-    /// Collects the tetrahedra in conflict with `p` and the facets around them.
-    fn find_cavity(&mut self, start: u32, p: DVec3) {
-        self.round += 1;
-        let (outside, inside) = (2 * self.round, 2 * self.round + 1);
-        self.cavity.clear();
-        self.boundary.clear();
-        self.cavity.push(start);
-        self.stamps[start as usize] = inside;
-        let mut next = 0;
-        while next < self.cavity.len() {
-            let tet = self.cavity[next] as usize;
-            next += 1;
-            for k in 0..4 {
-                let across = self.neighbours[tet][k];
-                let other = across >> 2;
-                let stamp = self.stamps[other as usize];
-                if stamp == inside {
-                    continue;
+    fn ghost_in_conflict<S: Store>(&self, store: &S, tet: u32, p: DVec3) -> bool {
+        let v = store.tet(tet);
+        let (a, b, c) = (self.point(v[0]), self.point(v[1]), self.point(v[2]));
+        let side = self.filter.orient3d(a, b, c, p);
+        if side != 0.0 {
+            return side > 0.0;
+        }
+        let behind = store.tet(store.neighbour(tet, 3) >> 2);
+        debug_assert!(behind[3] != INF);
+        self.filter.insphere(self.corners(behind), p) > 0.0
+    }
+
+    /// Collects the tetrahedra in conflict with `p` and the facets around them; `false` when one is taken by another thread
+    /// or `start` turns out not to conflict (it may have changed since the walk).
+    ///
+    /// Layer by layer: the neighbours of the last layer are gathered, then tested. Which of them are new and which conflict
+    /// cannot be foreseen, so lists grow without branches: every element is written, the length advances when it counts.
+    #[inline(always)]
+    fn find_cavity<S: Store>(&mut self, store: &mut S, start: u32, p: DVec3) -> bool {
+        self.visited = 0;
+        self.inside = 0;
+        self.make_room();
+        if !store.take(start) {
+            return false;
+        }
+        self.visited = store.visit(start);
+        self.tested[0] = start;
+        if S::SHARED && !self.in_conflict(store, start, p) {
+            return false;
+        }
+        store.note(start, true);
+        self.cavity[0] = start;
+        self.inside = 1;
+        let mut layer = 0;
+        while layer < self.inside {
+            let candidates = self.visited;
+            self.make_room();
+            // Lists and lengths as locals: the compiler then keeps them in registers.
+            let mut tested = std::mem::take(&mut self.tested);
+            let mut cavity = std::mem::take(&mut self.cavity);
+            let mut visited = self.visited;
+            let mut inside = self.inside;
+            let mut denied = false;
+            'layer: for &tet in &cavity[layer..inside] {
+                let n = store.neighbours(tet);
+                let room: &mut [u32; 5] = (&mut tested[visited..visited + 5])
+                    .try_into()
+                    .expect("five places");
+                let mut first = 0;
+                for k in 0..4 {
+                    let other = n[k] >> 2;
+                    if !store.take(other) {
+                        denied = true;
+                        visited += first;
+                        break 'layer;
+                    }
+                    room[first] = other;
+                    first += store.visit(other);
                 }
-                if stamp != outside && self.in_conflict(other, p) {
-                    self.stamps[other as usize] = inside;
-                    self.cavity.push(other);
-                } else {
-                    self.stamps[other as usize] = outside;
-                    let v = self.vertices[tet];
-                    let vertices = infinite_last(FACET[k].map(|i| v[i]));
-                    self.boundary.push(Boundary {
-                        vertices,
-                        outside: across,
-                    });
+                visited += first;
+            }
+            if !denied {
+                layer = inside;
+                for &tet in &tested[candidates..visited] {
+                    let conflict = self.in_conflict(store, tet, p);
+                    store.note(tet, conflict);
+                    cavity[inside] = tet;
+                    inside += usize::from(conflict);
                 }
             }
+            self.tested = tested;
+            self.cavity = cavity;
+            self.visited = visited;
+            self.inside = inside;
+            if denied {
+                return false;
+            }
+        }
+        self.collect_boundary(store);
+        true
+    }
+
+    /// Makes room for what one more layer can add: four neighbours a tetrahedron.
+    #[inline(always)]
+    fn make_room(&mut self) {
+        let needed = self.visited + 4 * self.inside + 5;
+        if self.tested.len() < needed {
+            self.tested.resize(2 * needed, 0);
+            self.cavity.resize(2 * needed, 0);
+            let blank = Boundary {
+                vertices: [0; 3],
+                outside: 0,
+            };
+            self.boundary.resize(2 * needed, blank);
+        }
+    }
+
+    /// The facets between the cavity and the rest.
+    #[inline(always)]
+    fn collect_boundary<S: Store>(&mut self, store: &S) {
+        self.make_room();
+        let mut facets = 0;
+        let boundary = self.boundary.as_mut_slice();
+        for &tet in &self.cavity[..self.inside] {
+            let v = store.tet(tet);
+            let n = store.neighbours(tet);
+            let room: &mut [Boundary; 5] = (&mut boundary[facets..facets + 5])
+                .try_into()
+                .expect("five places");
+            let mut first = 0;
+            for k in 0..4 {
+                room[first] = Boundary {
+                    vertices: facet(v, k),
+                    outside: n[k],
+                };
+                first += usize::from(!store.is_inside(n[k] >> 2));
+            }
+            facets += first;
+        }
+        self.facets = facets;
+    }
+
+    /// Lets go of everything taken by an insertion that is given up.
+    #[cold]
+    fn give_up<S: Store>(&mut self, store: &mut S) {
+        for &tet in &self.tested[..self.visited] {
+            store.release(tet);
         }
     }
 
     /// Replaces the cavity by the star of `v`.
-    fn fill(&mut self, v: u32) {
-        self.free.append(&mut self.cavity);
+    #[inline(always)]
+    fn fill<S: Store>(&mut self, store: &mut S, v: u32) {
+        for &tet in &self.cavity[..self.inside] {
+            store.free(tet);
+        }
         self.star.clear();
-        for i in 0..self.boundary.len() {
-            let Boundary { vertices, outside } = self.boundary[i];
-            let [a, b, c] = vertices;
-            let tet = match self.free.pop() {
-                Some(tet) => {
-                    self.vertices[tet as usize] = [v, a, b, c];
-                    tet
-                }
-                None => {
-                    self.vertices.push([v, a, b, c]);
-                    self.neighbours.push([0; 4]);
-                    self.stamps.push(0);
-                    (self.vertices.len() - 1) as u32
-                }
-            };
+        for b in &mut self.boundary[..self.facets] {
+            b.vertices = infinite_last(b.vertices);
+            let [x, y, z] = b.vertices;
+            let tet = store.slot();
+            store.set_tet(tet, [v, x, y, z]);
+            store.set_neighbour(b.outside, 4 * tet);
             self.star.push(tet);
-            self.link(4 * tet, outside);
+        }
+        if !self.link_by_table(store) {
+            self.link_by_sorting(store);
         }
         self.last = self.star[0];
-        if !self.link_by_table() {
-            self.link_by_sorting();
+        if S::SHARED {
+            for (b, &tet) in self.boundary[..self.facets].iter().zip(&self.star) {
+                store.release(tet);
+                store.release(b.outside >> 2);
+            }
         }
     }
 
     /// Links the star's tetrahedra through the edges they share; `false` when there are too many vertices.
-    fn link_by_table(&mut self) -> bool {
-        self.local.clear();
-        self.local.push(INF);
-        for i in 0..self.star.len() {
-            let tet = self.star[i];
-            let mut places = [0; 3];
-            for (place, v) in places.iter_mut().zip(self.boundary[i].vertices) {
-                if v == INF {
-                    continue;
-                }
-                let s = self.slot[v as usize] as usize;
-                *place = if self.local.get(s) == Some(&v) {
-                    s
-                } else if self.local.len() == TABLE {
-                    return false;
-                } else {
-                    self.slot[v as usize] = self.local.len() as u8;
-                    self.local.push(v);
-                    self.local.len() - 1
-                };
-            }
-            let [a, b, c] = places;
-            self.table[a * TABLE + b] = 4 * tet + 3;
-            self.table[b * TABLE + c] = 4 * tet + 1;
-            self.table[c * TABLE + a] = 4 * tet + 2;
-            self.boundary[i].vertices = places.map(|p| p as u32);
+    #[inline(always)]
+    fn link_by_table<S: Store>(&mut self, store: &mut S) -> bool {
+        // A star of f tetrahedra has f / 2 + 2 vertices besides its centre.
+        if self.facets / 2 + 2 > TABLE {
+            return false;
         }
-        for i in 0..self.star.len() {
-            let tet = self.star[i] as usize;
-            let [a, b, c] = self.boundary[i].vertices.map(|p| p as usize);
-            self.neighbours[tet][1] = self.table[c * TABLE + b];
-            self.neighbours[tet][2] = self.table[a * TABLE + c];
-            self.neighbours[tet][3] = self.table[b * TABLE + a];
+        let table: &mut [u32; TABLE * TABLE] = self
+            .table
+            .as_mut_slice()
+            .try_into()
+            .expect("the table is made this size");
+        let mut count = 0;
+        let n = self.points.len();
+        for (b, &tet) in self.boundary[..self.facets].iter_mut().zip(&self.star) {
+            for v in &mut b.vertices {
+                let slot = &mut self.slot[(*v as usize).min(n)];
+                let known = *slot < count && self.local[*slot as usize % TABLE] == *v;
+                *slot = if known { *slot } else { count };
+                self.local[*slot as usize % TABLE] = *v;
+                count += u8::from(!known);
+                *v = u32::from(*slot);
+            }
+            let [x, y, z] = b.vertices;
+            table[edge(x, y)] = 4 * tet + 3;
+            table[edge(y, z)] = 4 * tet + 1;
+            table[edge(z, x)] = 4 * tet + 2;
+        }
+        for (b, &tet) in self.boundary[..self.facets].iter().zip(&self.star) {
+            let [x, y, z] = b.vertices;
+            store.set_neighbours(
+                tet,
+                [b.outside, table[edge(z, y)], table[edge(x, z)], table[edge(y, x)]],
+            );
         }
         true
     }
 
-    fn link_by_sorting(&mut self) {
+    #[cold]
+    fn link_by_sorting<S: Store>(&mut self, store: &mut S) {
         let mut edges: Vec<([u32; 2], u32)> = Vec::with_capacity(3 * self.star.len());
-        for &tet in &self.star {
-            let [_, a, b, c] = self.vertices[tet as usize];
-            for (x, y, k) in [(b, c, 1), (c, a, 2), (a, b, 3)] {
-                edges.push(([x.min(y), x.max(y)], 4 * tet + k));
+        for (b, &tet) in self.boundary[..self.facets].iter().zip(&self.star) {
+            let [_, x, y, z] = store.tet(tet);
+            store.set_neighbour(4 * tet, b.outside);
+            for (p, q, k) in [(y, z, 1), (z, x, 2), (x, y, 3)] {
+                edges.push(([p.min(q), p.max(q)], 4 * tet + k));
             }
         }
         edges.sort_unstable();
         for pair in edges.chunks(2) {
             debug_assert_eq!(pair[0].0, pair[1].0);
-            self.link(pair[0].1, pair[1].1);
+            store.set_neighbour(pair[0].1, pair[1].1);
+            store.set_neighbour(pair[1].1, pair[0].1);
         }
     }
 }
 
+/// Vertices of facet `k`, counter-clockwise seen from outside.
+#[inline(always)]
+fn facet(v: [u32; 4], k: usize) -> [u32; 3] {
+    let [i, j, l] = FACET[k];
+    [v[i], v[j], v[l]]
+}
+
+/// Place of a directed edge in the table.
+#[inline(always)]
+fn edge(from: u32, to: u32) -> usize {
+    from as usize % TABLE * TABLE + to as usize % TABLE
+}
+
 /// Rotates a facet so that the infinite vertex, if it is one of the three, comes last.
-#[inline]
+#[inline(always)]
 fn infinite_last([a, b, c]: [u32; 3]) -> [u32; 3] {
     if a == INF {
         [b, c, a]

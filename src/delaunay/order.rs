@@ -7,33 +7,52 @@
 //! and the memory it touches is warm. The triangulation does not depend on the order; only the time does.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
-/// Bits a coordinate on the curve.
-const BITS: u32 = 20;
+/// Bits of the number of a round: eight to the power 15 points are more than there are.
+const ROUND_BITS: u32 = 4;
 
 /// Rounds end when one would hold fewer points than this.
 const SMALLEST_ROUND: usize = 64;
 
-/// Indices of the points in insertion order.
-pub(super) fn insertion_order(points: &[DVec3], bounds: [DVec3; 2]) -> Vec<u32> {
+/// Indices of the points in insertion order and where each round ends.
+#[derive(Clone, Debug)]
+pub(super) struct InsertionOrder {
+    /// Indices of the points.
+    pub indices: Vec<u32>,
+    /// End of each round in `indices`.
+    pub ends: Vec<u32>,
+}
+
+/// The order in which points are inserted.
+pub(super) fn insertion_order(points: &[DVec3], bounds: [DVec3; 2]) -> InsertionOrder {
     let [lo, hi] = bounds;
+    // One word a point, sorted as a number: round, position on the curve, index. A million points leave 13 bits a coordinate.
+    let index_bits = usize::BITS - points.len().leading_zeros();
+    let bits = ((64 - ROUND_BITS - index_bits) / 3).min(20);
     let extent = (hi - lo).max_element();
     let factor = if extent > 0.0 {
-        ((1u32 << BITS) - 1) as f64 / extent
+        ((1u32 << bits) - 1) as f64 / extent
     } else {
         0.0
     };
     let rounds = rounds(points.len());
-    let mut keys: Vec<(u64, u32)> = points
-        .iter()
-        .zip(0u32..)
-        .map(|(&p, i)| {
-            let cell = ((p - lo) * factor).to_array().map(|v| v as u32);
-            ((u64::from(round(i, rounds)) << (3 * BITS)) | hilbert(cell), i)
-        })
+    let key = |(&p, i): (&DVec3, u32)| {
+        let cell = ((p - lo) * factor).to_array().map(|v| v as u32);
+        let position = u64::from(round(i, rounds)) << (3 * bits) | hilbert(cell, bits);
+        position << index_bits | u64::from(i)
+    };
+    let mut keys: Vec<u64> = points.par_iter().zip(0..points.len() as u32).map(key).collect();
+    keys.par_sort_unstable();
+    let round_of = |k: u64| (k >> (3 * bits + index_bits)) as u32;
+    let ends = (0..rounds)
+        .map(|r| keys.partition_point(|&k| round_of(k) <= r) as u32)
         .collect();
-    keys.sort_unstable();
-    keys.into_iter().map(|(_, i)| i).collect()
+    let indices = keys
+        .into_iter()
+        .map(|k| (k & ((1 << index_bits) - 1)) as u32)
+        .collect();
+    InsertionOrder { indices, ends }
 }
 
 /// Number of rounds for `n` points.
@@ -62,9 +81,9 @@ fn mix(index: u64) -> u64 {
 }
 
 /// Position of a cell along the Hilbert curve.
-fn hilbert(cell: [u32; 3]) -> u64 {
+fn hilbert(cell: [u32; 3], bits: u32) -> u64 {
     let mut x = cell;
-    let mut q = 1u32 << (BITS - 1);
+    let mut q = 1u32 << (bits - 1);
     while q > 1 {
         let p = q - 1;
         for i in 0..3 {
@@ -81,7 +100,7 @@ fn hilbert(cell: [u32; 3]) -> u64 {
     x[1] ^= x[0];
     x[2] ^= x[1];
     let mut t = 0;
-    let mut q = 1u32 << (BITS - 1);
+    let mut q = 1u32 << (bits - 1);
     while q > 1 {
         if x[2] & q != 0 {
             t ^= q - 1;
@@ -112,7 +131,7 @@ mod tests {
         // The 512 cells of an 8 x 8 x 8 block at the origin are an unbroken stretch of the curve.
         let mut cells: Vec<(u64, [u32; 3])> = (0..512u32)
             .map(|i| [i & 7, i >> 3 & 7, i >> 6])
-            .map(|c| (hilbert(c), c))
+            .map(|c| (hilbert(c, 13), c))
             .collect();
         cells.sort_unstable();
         for w in cells.windows(2) {
@@ -126,7 +145,11 @@ mod tests {
         let points: Vec<DVec3> = (0..3000u32)
             .map(|i| DVec3::new(f64::from(i % 13), f64::from(i % 17), f64::from(i)))
             .collect();
-        let mut order = insertion_order(&points, [DVec3::ZERO, DVec3::splat(3000.0)]);
+        let InsertionOrder {
+            indices: mut order,
+            ends,
+        } = insertion_order(&points, [DVec3::ZERO, DVec3::splat(3000.0)]);
+        assert!(ends.len() == 2 && ends[1] == 3000);
         order.sort_unstable();
         assert!(order.into_iter().eq(0..3000));
     }

@@ -5,6 +5,7 @@
 pub mod circumsphere;
 pub mod closest;
 mod expansion;
+pub(crate) mod fixed;
 pub mod ids;
 pub mod length;
 pub mod mesh;

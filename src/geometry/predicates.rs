@@ -59,7 +59,15 @@ pub fn insphere(a: DVec3, b: DVec3, c: DVec3, d: DVec3, p: DVec3) -> f64 {
 /// Order of two points by x, then y, then z. Finite coordinates; `-0.0` equals `0.0`.
 #[inline]
 pub fn lexicographic(a: DVec3, b: DVec3) -> Ordering {
-    let by = |x: f64, y: f64| x.partial_cmp(&y).expect("coordinates are finite");
+    let by = |x: f64, y: f64| {
+        if x < y {
+            Ordering::Less
+        } else if x > y {
+            Ordering::Greater
+        } else {
+            Ordering::Equal
+        }
+    };
     by(a.x, b.x).then_with(|| by(a.y, b.y)).then_with(|| by(a.z, b.z))
 }
 
@@ -78,21 +86,36 @@ pub fn insphere_perturbed(a: DVec3, b: DVec3, c: DVec3, d: DVec3, p: DVec3) -> f
 #[cold]
 #[inline(never)]
 pub fn perturbation(a: DVec3, b: DVec3, c: DVec3, d: DVec3, p: DVec3) -> f64 {
-    let points = [a, b, c, d, p];
-    let mut order = [0usize, 1, 2, 3, 4];
-    order.sort_unstable_by(|&i, &j| lexicographic(points[j], points[i]));
-    for i in order {
-        if i == 4 {
-            return -1.0;
+    perturbation_by(orient3d, [a, b, c, d], p)
+}
+
+/// [`perturbation`] with a given exact orientation.
+pub(crate) fn perturbation_by(
+    orient3d: impl Fn(DVec3, DVec3, DVec3, DVec3) -> f64,
+    tet: [DVec3; 4],
+    p: DVec3,
+) -> f64 {
+    // Corners from the largest down; past p itself nothing counts, since its own coefficient is not zero.
+    let mut tried = [false; 4];
+    for _ in 0..4 {
+        let mut largest = 4;
+        for i in (0..4).filter(|&i| !tried[i]) {
+            let best = if largest == 4 { p } else { tet[largest] };
+            if lexicographic(tet[i], best).is_gt() {
+                largest = i;
+            }
         }
-        let mut t = [a, b, c, d];
-        t[i] = p;
+        if largest == 4 {
+            break;
+        }
+        tried[largest] = true;
+        let mut t = tet;
+        t[largest] = p;
         let o = orient3d(t[0], t[1], t[2], t[3]);
         if o != 0.0 {
             return o;
         }
     }
-    // The coefficient of p is the orientation of the tetrahedron itself, which is not zero.
     -1.0
 }
 

@@ -220,3 +220,36 @@ pub fn shuffled(points: &[DVec3], seed: u64) -> Vec<DVec3> {
     out.shuffle(&mut rng(seed));
     out
 }
+
+/// Sets large enough for several threads to work on.
+pub fn larger() -> Vec<(String, Vec<DVec3>)> {
+    let mut rng = rng(77);
+    let n = if std::env::var_os("MEDIAL_SLOW").is_some() {
+        60_000
+    } else {
+        6_000
+    };
+    let cube = (0..n)
+        .map(|_| DVec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0))))
+        .collect();
+    let sphere = (0..n).map(|_| unit(&mut rng)).collect();
+    let ellipsoid = (0..n)
+        .map(|_| unit(&mut rng) * DVec3::new(3.0, 2.0, 1.0))
+        .collect();
+    let flat = (0..n)
+        .map(|_| {
+            DVec3::new(
+                rng.random_range(-1.0..1.0),
+                rng.random_range(-1.0..1.0),
+                1e-3 * rng.random_range(-1.0..1.0),
+            )
+        })
+        .collect();
+    vec![
+        ("cube".into(), cube),
+        ("sphere".into(), sphere),
+        ("ellipsoid".into(), ellipsoid),
+        ("flat slab".into(), flat),
+        ("grid".into(), shuffled(&grid(18, 18, 18), 1)),
+    ]
+}
