@@ -8,11 +8,14 @@ mod output;
 mod progress;
 mod run_record;
 
+mod change;
 mod check;
+mod demo;
 mod match_command;
 mod mesh;
 mod report;
 mod scaffold;
+mod synth;
 
 use clap::{Parser, Subcommand};
 use common::Common;
@@ -32,6 +35,8 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Make two carpal-like bones, match them and report: no input needed.
+    Demo(demo::DemoArgs),
     /// What is in a file, is it usable, in which frame and units; exit 1 if not.
     Check(check::CheckArgs),
     /// Surface mesh of a point cloud, by segregation.
@@ -40,6 +45,10 @@ enum Command {
     Scaffold(scaffold::ScaffoldArgs),
     /// Correspondences, rigid transform and shape difference of two shapes.
     Match(match_command::MatchArgs),
+    /// How much lesions grew between two dates, where, and whether that is more than the measurement's error.
+    Change(change::ChangeArgs),
+    /// Synthetic shapes, populations and deformations with truth.json.
+    Synth(synth::SynthArgs),
     /// The page of a result folder, made again from its JSON.
     Report(report::ReportArgs),
 }
@@ -103,6 +112,9 @@ pub fn main() -> ExitCode {
         Command::Mesh(args) => mesh::run(args, common),
         Command::Scaffold(args) => scaffold::run(args, common),
         Command::Match(args) => match_command::run(args, common),
+        Command::Demo(args) => demo::run(args, common),
+        Command::Change(args) => change::run(args, common),
+        Command::Synth(args) => synth::run(args, common),
         Command::Report(args) => report::run(args, common),
     };
     match done {

@@ -1,5 +1,6 @@
 //! Why a pipeline stopped: the stage, and what it said.
 
+use crate::change::ChangeError;
 use crate::delaunay::DelaunayError;
 use crate::fine_scaffold::FineScaffoldError;
 use crate::input::sampling::SamplingError;
@@ -33,6 +34,8 @@ pub enum StageError {
     FineScaffold(#[from] FineScaffoldError),
     #[error(transparent)]
     Regularise(#[from] RegulariseError),
+    #[error(transparent)]
+    Change(#[from] ChangeError),
     #[error(transparent)]
     Registration(#[from] RegistrationError),
 }

@@ -1,11 +1,13 @@
 //! The front door: every stage in order, with defaults, timed. Nothing here computes; it calls.
 
+pub mod change;
 pub mod documents;
 pub mod error;
 pub mod matching;
 pub mod scaffold;
 pub mod timing;
 
+pub use change::{ChangeRun, ChangeRunSettings, change_of};
 pub use error::{PipelineError, StageError};
 pub use matching::{MatchRun, MatchSettings, MatchSide, match_shapes};
 pub use scaffold::{ScaffoldRun, ScaffoldSettings, scaffold};

@@ -19,6 +19,15 @@ pub fn stderr(out: &Output) -> String {
     String::from_utf8_lossy(&out.stderr).into_owned()
 }
 
+/// A capitate-like bone, closed, in mm.
+pub fn bone() -> TriangleMesh {
+    let mesh = datasets_synthetic::bones::capitate_like(0).mesh(6_000);
+    TriangleMesh {
+        points: mesh.points,
+        triangles: mesh.triangles,
+    }
+}
+
 /// Folder of real shapes: `MEDIAL_DATA`, or `../shared/data` beside the workspace; says so when there is none.
 pub fn real_data() -> Option<PathBuf> {
     let dir = std::env::var_os("MEDIAL_DATA").map_or_else(

@@ -1,0 +1,153 @@
+//! The command line as a user meets it: exit codes, where output goes, and what damaged files are told.
+
+mod support;
+
+use std::fs;
+use support::{medial, stderr, write_ply};
+
+#[test]
+fn help_names_every_command() {
+    let out = medial(&["--help"]);
+    let text = String::from_utf8_lossy(&out.stdout).into_owned();
+    for command in ["demo", "check", "scaffold", "match", "synth"] {
+        assert!(text.contains(command), "{command} is missing from\n{text}");
+    }
+    assert_eq!(out.status.code(), Some(0));
+}
+
+#[test]
+fn a_missing_file_and_an_unknown_option_exit_2() {
+    for args in [
+        &["check", "no-such-file.ply"][..],
+        &["scaffold", "--no-such-option"],
+        &["scaffold"],
+    ] {
+        assert_eq!(medial(args).status.code(), Some(2), "{args:?}");
+    }
+    assert!(stderr(&medial(&["check", "no-such-file.ply"])).contains("no-such-file.ply"));
+}
+
+/// Each damaged file must end in exit 2 and a message that names the file, for every command that reads it.
+#[test]
+fn damaged_files_exit_2_and_are_named() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let at = |name: &str| dir.path().join(name);
+    let ply = |vertices: &str, body: &str| {
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex {vertices}\nproperty double x\nproperty double y\nproperty double z\nend_header\n{body}"
+        )
+    };
+    let cases: Vec<(&str, Vec<u8>)> = vec![
+        ("empty.ply", Vec::new()),
+        ("truncated.ply", ply("4", "0 0 0\n1 0 0\n").into_bytes()),
+        ("nan.ply", ply("4", "0 0 0\n1 0 0\n0 nan 0\n0 0 1\n").into_bytes()),
+        ("huge.ply", ply("1000000000000", "0 0 0\n").into_bytes()),
+        ("equal.xyz", "1 2 3\n".repeat(50).into_bytes()),
+        (
+            "coplanar.xyz",
+            (0..100)
+                .map(|i| format!("{} {} 0\n", i % 10, i / 10))
+                .collect::<String>()
+                .into_bytes(),
+        ),
+        ("three.xyz", b"0 0 0\n1 0 0\n0 1 0\n".to_vec()),
+        ("stl-named.ply", b"solid x\nfacet normal 0 0 1\n".to_vec()),
+        (
+            "noise.stl",
+            (0..500u32)
+                .map(|i| (i.wrapping_mul(2654435761) >> 13) as u8)
+                .collect(),
+        ),
+        (
+            "noise.nii.gz",
+            (0..500u32).map(|i| (i.wrapping_mul(40503) >> 3) as u8).collect(),
+        ),
+        (
+            "text.nrrd",
+            b"NRRD0004\ntype: short\ndimension: 3\nsizes: 1000000 1000000 1\nencoding: raw\n\nab".to_vec(),
+        ),
+    ];
+    for (name, bytes) in &cases {
+        fs::write(at(name), bytes).expect("writable");
+        let path = at(name);
+        let path = path.to_str().expect("utf-8");
+        let target = dir.path().join("out");
+        let target = target.to_str().expect("utf-8");
+        let out = medial(&["scaffold", path, "-o", target, "--no-report"]);
+        let message = stderr(&out);
+        assert_eq!(out.status.code(), Some(2), "{name}: {message}");
+        assert!(message.contains(name), "{name} is not named in: {message}");
+        assert!(!message.contains("panicked"), "{name}: {message}");
+    }
+}
+
+#[test]
+fn check_says_no_to_an_open_mesh_and_yes_to_a_closed_one() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let mut mesh = support::bone();
+    let good = dir.path().join("closed.ply");
+    write_ply(&good, &mesh);
+    let out = medial(&["check", good.to_str().expect("utf-8"), "--json"]);
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+    serde_json::from_slice::<serde_json::Value>(&out.stdout).expect("stdout is JSON and nothing else");
+
+    mesh.triangles.truncate(mesh.triangles.len() * 2 / 3);
+    let bad = dir.path().join("open.ply");
+    write_ply(&bad, &mesh);
+    assert_eq!(
+        medial(&["check", bad.to_str().expect("utf-8")]).status.code(),
+        Some(1)
+    );
+}
+
+#[test]
+fn scaffold_writes_what_the_contract_names_and_the_same_bytes_on_any_number_of_threads() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let input = dir.path().join("bone.ply");
+    write_ply(&input, &support::bone());
+    let mut seen: Vec<Vec<u8>> = Vec::new();
+    for threads in ["1", "2"] {
+        let target = dir.path().join(format!("out{threads}"));
+        let out = medial(&[
+            "scaffold",
+            input.to_str().expect("utf-8"),
+            "-o",
+            target.to_str().expect("utf-8"),
+            "--threads",
+            threads,
+            "--json",
+        ]);
+        assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+        for file in [
+            "run.json",
+            "scaffold.json",
+            "surface.ply",
+            "fine.ma",
+            "sheets.vtp",
+            "curves.vtp",
+            "scene.glb",
+            "report.html",
+        ] {
+            assert!(target.join(file).is_file(), "{file} is missing");
+        }
+        let json: serde_json::Value =
+            serde_json::from_slice(&fs::read(target.join("scaffold.json")).expect("readable")).expect("JSON");
+        assert_eq!(json["full"]["morse"], 1);
+        assert_eq!(json["topology"]["agree"], true, "{}", json["topology"]);
+        assert_eq!(json["topology"]["solid_betti"], serde_json::json!([1, 0, 0]));
+        seen.push(
+            [
+                "scaffold.json",
+                "surface.ply",
+                "fine.ma",
+                "sheets.vtp",
+                "curves.vtp",
+                "scene.glb",
+            ]
+            .iter()
+            .flat_map(|f| fs::read(target.join(f)).expect("readable"))
+            .collect(),
+        );
+    }
+    assert!(seen[0] == seen[1], "threads change the output");
+}
