@@ -7,7 +7,7 @@ use super::progress::Progress;
 use super::run_record::RunRecord;
 use super::{Failure, Verdict, warn_all};
 use clap::Args;
-use datasets_synthetic::{bones, rigid};
+use datasets_synthetic::{bones, population, rigid};
 use medial_scaffold::geometry::{Rigid, TriangleMesh};
 use medial_scaffold::input::{Geometry, Shape};
 use medial_scaffold::pipeline::match_shapes;
@@ -16,6 +16,9 @@ use std::path::PathBuf;
 
 /// Triangles of each bone, about.
 const TRIANGLES: usize = 10_000;
+
+/// Share of the population's variation between the two bones: left and right of one person differ about so much.
+const LIKENESS: f64 = 0.4;
 
 /// Arguments of `medial demo`.
 #[derive(Debug, Args)]
@@ -30,8 +33,9 @@ pub fn run(args: &DemoArgs, common: &Common) -> Result<Verdict, Failure> {
     make_dir(&args.output)?;
     let progress = Progress::new(common.quiet);
     progress.stage("two bones");
-    let target = mesh(&bones::capitate_like(2 * common.seed + 1).mesh(TRIANGLES));
-    let mut source = mesh(&bones::capitate_like(2 * common.seed + 2).mesh(TRIANGLES));
+    let reference = bones::hamate_like(0);
+    let target = mesh(&reference.mesh(TRIANGLES));
+    let mut source = mesh(&relative(&reference, common.seed + 1).mesh(TRIANGLES));
     let given = rigid::random(common.seed);
     for p in &mut source.points {
         *p = given.apply(*p);
@@ -49,8 +53,8 @@ pub fn run(args: &DemoArgs, common: &Common) -> Result<Verdict, Failure> {
         PlyEncoding::default(),
     )?;
 
-    let target = Shape::generated("one capitate-like bone", Geometry::Mesh(target));
-    let source = Shape::generated("another, moved", Geometry::Mesh(source));
+    let target = Shape::generated("a hamate-like bone", Geometry::Mesh(target));
+    let source = Shape::generated("another individual", Geometry::Mesh(source));
     let settings = MatchOptions::default().settings(common);
     let done = match_shapes(&target, &source, &settings, &|stage| progress.stage(stage))?;
     let mut record = RunRecord::new(common, &settings)?;
@@ -72,7 +76,7 @@ pub fn run(args: &DemoArgs, common: &Common) -> Result<Verdict, Failure> {
     } else if !common.quiet {
         print_text(&summary(&done))?;
         print_text(&format!(
-            "the second bone is another individual, turned at random: the pose found is {off:.2} degrees from the turn\n\
+            "the second bone differs in size, bend and taper and was turned at random: the pose found is {off:.2} degrees from the turn\n\
              open {}\n",
             args.output
                 .join(if common.no_report {
@@ -84,6 +88,17 @@ pub fn run(args: &DemoArgs, common: &Common) -> Result<Verdict, Failure> {
         ))?;
     }
     Ok(if off < 5.0 { Verdict::Fine } else { Verdict::SaidNo })
+}
+
+/// Another individual, at [`LIKENESS`] of the differences of its population.
+fn relative(reference: &datasets_synthetic::Shape, seed: u64) -> datasets_synthetic::Shape {
+    let modes = population::modes(&reference.bounds());
+    let weights: Vec<f64> = population::individual(reference, seed)
+        .weights
+        .iter()
+        .map(|w| LIKENESS * w)
+        .collect();
+    reference.warped(&population::warp_of(&modes, &weights))
 }
 
 fn mesh(made: &datasets_synthetic::TriangleMesh) -> TriangleMesh {
