@@ -86,7 +86,7 @@ fn poses(c: &mut Criterion) {
         let truth = Isometry3::new(Vector3::new(1.0, 2.0, 3.0), Vector3::new(0.4, 0.2, -0.7));
         let source: Vec<_> = (0..n).map(|_| point(10.0)).collect();
         let noisy = |k: usize, p: &Point3<f64>, e: Point3<f64>| {
-            if k % 10 == 0 {
+            if k.is_multiple_of(10) {
                 truth * p + e.coords * 0.005
             } else {
                 e

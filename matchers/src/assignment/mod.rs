@@ -1,6 +1,6 @@
 //! The linear sum assignment problem (LSAP), rectangular, with forbidden pairs and dual bounds.
 //!
-//! In: a [`Table`] of costs (`+inf` forbids a pair). Out: the cheapest one-to-one assignment of the shorter side, its
+//! In: a [`Table`](crate::Table) of costs (`+inf` forbids a pair). Out: the cheapest one-to-one assignment of the shorter side, its
 //! cost, and the dual prices that prove it.
 //!
 //! * [`jonker_volgenant`]: the solver

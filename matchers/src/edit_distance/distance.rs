@@ -40,7 +40,8 @@ pub struct EditSettings {
     pub merge: bool,
     /// Largest number of nodes and of sheets of either graph for which the distance is proven.
     pub exact_up_to: usize,
-    /// Most search nodes of one branch and bound over maps.
+    /// Most search nodes over all branch and bounds over maps. A search node of two unrelated graphs of 12 nodes, 18 curves
+    /// and 8 sheets takes about 0.2 ms, their proof 2 000 to 20 000 of them; similar graphs need next to none.
     pub max_search_nodes: usize,
     /// Most sets of heals looked at in the proof.
     pub max_heal_sets: usize,
@@ -147,7 +148,7 @@ pub fn edit_distance(
 fn canonical_distance(model: &Model) -> Result<EditDistance, ProblemError> {
     let settings = model.settings;
     let mut best = model
-        .solve(&Heals::default())?
+        .solve(&Heals::default(), settings.max_search_nodes)?
         .expect("no heals do not contradict each other");
     let mut proof = Proof {
         heal_sets: 1,
@@ -282,14 +283,14 @@ impl<'a> Model<'a> {
     }
 
     /// The cheapest map for a set of heals, proven when the graphs are small. `None` when heals contradict each other.
-    fn solve(&self, heals: &Heals) -> Result<Option<Solution>, ProblemError> {
+    fn solve(&self, heals: &Heals, max_search_nodes: usize) -> Result<Option<Solution>, ProblemError> {
         let Some((target, source)) = self.apply(heals) else {
             return Ok(None);
         };
         let problem = self.problem(&target, &source)?;
         let first = match_as_stored(&problem, &[], &self.settings.matching);
         let found = if self.small() {
-            branch_and_bound::search(&problem, &first.map, self.settings.max_search_nodes)
+            branch_and_bound::search(&problem, &first.map, max_search_nodes)
         } else {
             let lower_bound = branch_and_bound::root_lower_bound(&problem).min(first.price);
             let exact = lower_bound >= first.price - self.tolerance;
@@ -359,6 +360,11 @@ impl<'a> Model<'a> {
         }))
     }
 
+    /// Search nodes that are left to spend.
+    fn left(&self, proof: &Proof) -> usize {
+        self.settings.max_search_nodes.saturating_sub(proof.search_nodes)
+    }
+
     fn with(&self, heals: &Heals, candidate: &Candidate) -> Heals {
         let mut more = heals.clone();
         let list = if candidate.on_target {
@@ -396,10 +402,11 @@ impl<'a> Model<'a> {
                 }
             }
             proof.heal_sets += 1;
-            if let Some(anew) = self.solve(&best.heals)?
-                && anew.price < best.price
-            {
-                *best = anew;
+            if let Some(anew) = self.solve(&best.heals, self.left(proof))? {
+                proof.search_nodes += anew.found.search_nodes;
+                if anew.price < best.price {
+                    *best = anew;
+                }
             }
         }
     }
@@ -457,7 +464,7 @@ impl<'a> Model<'a> {
             .get(next)
             .filter(|c| price + c.heal.price < best.price - self.tolerance);
         let Some(candidate) = candidate else {
-            let Some(settled) = self.solve(heals)? else {
+            let Some(settled) = self.solve(heals, self.left(proof))? else {
                 return Ok(());
             };
             proof.search_nodes += settled.found.search_nodes;
