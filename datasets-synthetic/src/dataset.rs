@@ -334,8 +334,8 @@ pub fn write_dataset(
 
 fn check(s: &DatasetSettings) -> Result<(), DatasetError> {
     let bad = |name, value: String, wanted| Err(DatasetError::Setting { name, value, wanted });
-    if !(20..=20_000_000).contains(&s.triangles) {
-        return bad("triangles", s.triangles.to_string(), "from 20 to 20 million");
+    if !(20..=10_000_000).contains(&s.triangles) {
+        return bad("triangles", s.triangles.to_string(), "from 20 to 10 million");
     }
     if !(1..=50_000_000).contains(&s.points) {
         return bad("points", s.points.to_string(), "from 1 to 50 million");

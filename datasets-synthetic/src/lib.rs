@@ -4,6 +4,25 @@
 //! are mm throughout, directions unit vectors, seeds `u64`; the same arguments give the same bytes on every machine and with any number
 //! of threads.
 //!
+//! | to get | call |
+//! |---|---|
+//! | a shape with its truth | [`shapes::ellipsoid`]`(3., 2., 1.)`, [`shapes::box_shape`], [`shapes::torus`], ... ([`shapes`] lists them) |
+//! | a bone | [`bones::capitate_like`]`(seed)`, [`bones::all`]`(seed)`; seed 0 is the reference |
+//! | a mesh of about n triangles | [`Shape::mesh`]`(n)` |
+//! | points on the surface itself | [`Shape::sample_uniform`]`(n, seed)`, [`Shape::sample_poisson`], [`Shape::sample_density_gradient`] |
+//! | points on any mesh | [`sample_uniform`]`(&mesh, n, seed)`, [`sample_poisson`], [`sample_density_gradient`]`(&mesh, n, 20., seed)` |
+//! | noise, outliers, spacing | [`add_noise`]`(&points, sigma_mm, seed)`, [`add_outliers`]`(&points, share, inflate, seed)`, [`mean_spacing`]`(area, n)` |
+//! | topology, volume, area of a mesh | [`TriangleMesh::topology`], [`TriangleMesh::volume`], [`TriangleMesh::area`] |
+//! | exact volume, area, Betti numbers, medial set, counts | `shape.truth` ([`Truth`]); [`truth::Medial::distance`]; [`Shape::volume_mm3`] |
+//! | inside or outside | [`Shape::field`], [`implicit::Field::value`] (negative inside) |
+//! | a pose | [`rigid::random`]`(seed)`, [`rigid::random_of_angle`], [`RigidMotion::mirror`]; [`Shape::moved`] |
+//! | a smooth deformation | [`Warp::random_smooth`], [`Warp::bend_x`], [`Warp::swelling`], ...; [`Shape::warped`] |
+//! | a crop | [`deform::crop_half_space`], [`deform::crop_half_spaces`], [`deform::visible_from`], [`deform::remove_ball`] |
+//! | a lesion that grows by p percent | [`deform::growth::random_lesion`], [`deform::growth::grow`], [`shapes::star_blob`] |
+//! | a population with known modes | [`population::population`], [`population::one_mode_ellipsoids`], [`population::two_mode_ellipsoids`] |
+//! | a label mask, a NIfTI file | [`masks::LabelMask::fill`], [`masks::LabelMask::fill_mesh`], [`masks::sphere_mask`]; [`nifti::save`] |
+//! | files by name | `"bones".parse::<ShapeKind>()`, [`ShapeKind::list`], [`generate`], [`write_dataset`] |
+//!
 //! ```
 //! use datasets_synthetic::{add_noise, mean_spacing, rigid, sample_poisson, shapes};
 //!

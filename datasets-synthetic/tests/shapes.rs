@@ -97,6 +97,40 @@ fn mesh_volume_and_area_converge_to_the_analytic_values() {
     }
 }
 
+/// Triangles of blended and carved solids are well shaped, also where a finer mesh is split from a coarser one.
+#[test]
+fn triangles_are_well_shaped() {
+    for n in [6_000, 120_000] {
+        let mesh = datasets_synthetic::bones::hamate_like(0).mesh(n);
+        assert!(mesh.topology().is_closed_oriented_manifold());
+        assert!(
+            (mesh.triangles.len() as f64 / n as f64 - 1.0).abs() < 0.2,
+            "{} for {n}",
+            mesh.triangles.len()
+        );
+        let smallest_angle = |t: usize| {
+            let c = mesh.corners(t);
+            let angle = |k: usize| {
+                (c[(k + 1) % 3] - c[k])
+                    .angle_between(c[(k + 2) % 3] - c[k])
+                    .to_degrees()
+            };
+            angle(0).min(angle(1)).min(angle(2))
+        };
+        let angles: Vec<f64> = (0..mesh.triangles.len()).map(smallest_angle).collect();
+        let mean = angles.iter().sum::<f64>() / angles.len() as f64;
+        let bad = angles.iter().filter(|a| **a < 15.0).count() as f64 / angles.len() as f64;
+        eprintln!(
+            "{n} triangles: mean smallest angle {mean:.1} degrees, {:.3} % below 15",
+            100.0 * bad
+        );
+        assert!(
+            mean > 42.0 && bad < 0.002,
+            "mean smallest angle {mean}, share below 15 degrees {bad}"
+        );
+    }
+}
+
 /// A warp that keeps volume takes the analytic value away, so that the extrapolated one can be compared with it.
 #[test]
 fn extrapolated_volumes_are_accurate() {

@@ -17,6 +17,7 @@
 use super::field::Field;
 use super::remesh::{RemeshSettings, remesh};
 use crate::mesh::{Bounds, TriangleMesh};
+use crate::shapes::subdivide;
 use glam::DVec3;
 use rayon::prelude::*;
 use thiserror::Error;
@@ -55,6 +56,9 @@ pub enum PolygoniseError {
 /// Lattice points at most (8 bytes each).
 const LATTICE_LIMIT: f64 = 3e8;
 
+/// Finer meshes are made by splitting the triangles of a mesh of at most this many and projecting the new vertices.
+const MARCHED_TRIANGLES: f64 = 100_000.0;
+
 /// Side of the lattice's cubes in target edge lengths: the raw mesh then has about twice the wanted vertices.
 const CUBE_PER_EDGE: f64 = 1.25;
 
@@ -92,17 +96,26 @@ pub fn mesh_with_triangles(
 ) -> Result<TriangleMesh, PolygoniseError> {
     let coarse = (bounds.size().max_element() / 24.0).min(0.45 * finest_feature);
     let area = march(field, bounds, coarse)?.area();
-    let wanted = (4.0 * area / (3f64.sqrt() * triangles.max(4) as f64)).sqrt();
-    let lattice = (CUBE_PER_EDGE * wanted).min(0.45 * finest_feature);
+    // Beyond a hundred thousand triangles the lattice would cost more than the surface: split a coarser mesh instead.
+    let parts = (triangles as f64 / MARCHED_TRIANGLES).sqrt().ceil().max(1.0) as usize;
+    let marched = (triangles / (parts * parts)).max(4);
+    let edge_length = (4.0 * area / (3f64.sqrt() * marched as f64)).sqrt();
+    let lattice = (CUBE_PER_EDGE * edge_length).min(0.45 * finest_feature);
     let raw = march(field, bounds, lattice)?;
-    Ok(remesh(
+    let even = remesh(
         &raw,
         field,
         &RemeshSettings {
-            edge_length: wanted,
+            edge_length,
             ..RemeshSettings::default()
         },
-    ))
+    );
+    if parts == 1 {
+        return Ok(even);
+    }
+    let mut fine = subdivide(&even, parts);
+    fine.points.par_iter_mut().for_each(|p| *p = field.project(*p));
+    Ok(fine)
 }
 
 /// The lattice: cube corners first, then cube centres.
