@@ -28,6 +28,6 @@ fi
 cp "$here/tests/page/page_test.mjs" "$tools/page_test.mjs"
 status=0
 for report in "$@"; do
-  timeout 300 node "$tools/page_test.mjs" "$report" ${PICTURES:+"$PICTURES"} || status=$?
+  timeout 600 node "$tools/page_test.mjs" "$report" ${PICTURES:+"$PICTURES"} || status=$?
 done
 exit $status

@@ -11,10 +11,13 @@
 //! 7. [`growth`]: signed displacement of the surface, patches, and parts by sheet once scaffolds are attached
 //!    ([`LesionChange::attach_scaffolds`]).
 //!
+//! [`mod@compare`] sets several segmentations of one date against each other and gives the spread that the interval can use.
+//!
 //! Nothing is aligned here: shapes come in the frame of their files, or moved by registration on other structures.
 //! Cost: linear in voxels, `n log n` in surface points.
 
 pub mod agreement;
+pub mod compare;
 pub mod error_model;
 pub mod growth;
 pub mod marching_cubes;
@@ -28,6 +31,7 @@ pub mod slices;
 mod report;
 
 pub use agreement::{Agreement, SurfaceAgreement};
+pub use compare::{Comparison, compare};
 pub use error_model::{VolumeChange, VolumeError};
 pub use growth::{GrowthMap, GrowthSummary, Part, PartKind, SheetPair};
 pub use morphology::{Measures, ThicknessStatistics};

@@ -71,14 +71,23 @@ pub struct Fact {
     pub value: String,
 }
 
+/// How numbers of a record are shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Digits {
+    /// All of them: settings.
+    All,
+    /// Three significant ones: results.
+    Few,
+}
+
 /// All plain values below a value; arrays of plain values are one fact, arrays of records one a record.
-pub fn facts(value: &Value) -> Vec<Fact> {
+pub fn facts(value: &Value, digits: Digits) -> Vec<Fact> {
     let mut out = Vec::new();
-    gather(String::new(), value, &mut out);
+    gather(String::new(), value, digits, &mut out);
     out
 }
 
-fn gather(name: String, value: &Value, out: &mut Vec<Fact>) {
+fn gather(name: String, value: &Value, digits: Digits, out: &mut Vec<Fact>) {
     let below = |key: &str| {
         if name.is_empty() {
             key.to_owned()
@@ -87,17 +96,16 @@ fn gather(name: String, value: &Value, out: &mut Vec<Fact>) {
         }
     };
     match value {
-        Value::Object(map) => map.iter().for_each(|(k, v)| gather(below(k), v, out)),
+        Value::Object(map) => map.iter().for_each(|(k, v)| gather(below(k), v, digits, out)),
         Value::Array(list) if list.iter().any(Value::is_object) => {
             list.iter()
                 .enumerate()
-                .for_each(|(i, v)| gather(below(&i.to_string()), v, out));
+                .for_each(|(i, v)| gather(below(&i.to_string()), v, digits, out));
         }
         plain => out.push(Fact {
             name,
-            // Settings are shown exactly, not rounded.
             value: match plain {
-                Value::Number(n) => n.to_string(),
+                Value::Number(n) if digits == Digits::All => n.to_string(),
                 other => text(other),
             },
         }),
@@ -105,9 +113,9 @@ fn gather(name: String, value: &Value, out: &mut Vec<Fact>) {
 }
 
 /// Any record as a two-column table.
-pub fn facts_table(caption: &str, value: &Value) -> Table {
+pub fn facts_table(caption: &str, value: &Value, digits: Digits) -> Table {
     let mut table = Table::new(caption, &[":field", ":value"]);
-    for f in facts(value) {
+    for f in facts(value, digits) {
         table.row([f.name, f.value]);
     }
     table
@@ -128,10 +136,12 @@ pub fn run_section(run: &Value) -> Section {
             }
         }
     }
-    section.tables.push(facts_table("Run", &Value::Object(general)));
+    section
+        .tables
+        .push(facts_table("Run", &Value::Object(general), Digits::All));
     for (key, caption) in [("inputs", "Inputs"), ("settings", "Settings, defaults filled in")] {
         if let Some(value) = map.get(key) {
-            section.tables.push(facts_table(caption, value));
+            section.tables.push(facts_table(caption, value, Digits::All));
         }
     }
     let stages = items(run, "stages");

@@ -3,7 +3,7 @@
 //! In: `match.json`, `run.json` and a scene whose layers are named by the shapes `target` and `source` (source layers already
 //! moved). Out: a [`Report`].
 
-use super::facts::{at, facts_table, items, number, run_section, shown, text};
+use super::facts::{Digits, at, facts_table, items, number, run_section, shown, text};
 use super::page::{KeyFigure, NoteLevel, Report, ReportError, Section, Table};
 use super::plot::{pretty, signed};
 use super::scene::Scene;
@@ -179,12 +179,23 @@ fn difference(r: &Value) -> Section {
     section.tables.push(table);
     let sheets = items(r, "difference.per_sheet");
     if let Some(Value::Object(first)) = sheets.first() {
-        let names: Vec<&str> = first
+        let mut names: Vec<&str> = first
             .iter()
             .filter(|(_, v)| !v.is_object())
             .map(|(k, _)| k.as_str())
             .collect();
-        let mut table = Table::new("Sheet by sheet", &names);
+        // Ids first, the rest in its order.
+        names.sort_by_key(|n| match *n {
+            "target" => 0,
+            "source" => 1,
+            _ => 2,
+        });
+        let words: Vec<String> = names.iter().map(|n| n.replace('_', " ")).collect();
+        let words: Vec<&str> = words.iter().map(String::as_str).collect();
+        let mut table = Table::new(
+            "Sheet by sheet (lengths mm, areas mm\u{b2}, volumes mm\u{b3})",
+            &words,
+        );
         for s in sheets {
             table.row(names.iter().map(|n| shown(s, n)));
         }
@@ -219,8 +230,25 @@ fn correspondences(r: &Value) -> Section {
 
 fn edit(r: &Value) -> Section {
     let mut section = Section::new("Edit distance");
-    if let Some(value) = at(r, "edit") {
-        section.tables.push(facts_table("", value));
+    let Some(Value::Object(map)) = at(r, "edit") else {
+        return section;
+    };
+    let mut summary = map.clone();
+    summary.remove("operations");
+    section
+        .tables
+        .push(facts_table("", &Value::Object(summary), Digits::Few));
+    let operations = items(r, "edit.operations");
+    if !operations.is_empty() {
+        let fields = ["operation", "target", "source", "price"];
+        let mut table = Table::new(
+            "Operations from the source to the target",
+            &[":operation", "target", "source", "price"],
+        );
+        for o in operations {
+            table.row(fields.map(|f| shown(o, f)));
+        }
+        section.tables.push(table);
     }
     section
 }

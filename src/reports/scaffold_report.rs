@@ -3,7 +3,7 @@
 //! In: `scaffold.json`, `run.json` and the scene. Out: a [`Report`] with the bone, translucent, its sheets, curves and nodes;
 //! how many elements each tolerance keeps; tables of sheets, curves and nodes; topology and fidelity checks.
 
-use super::facts::{at, items, number, required, run_section, shown};
+use super::facts::{Digits, at, items, number, required, run_section, shown};
 use super::page::{KeyFigure, NoteLevel, Plot, Report, ReportError, Section, Table};
 use super::plot::{Chart, Marker, Series, SeriesStyle, pretty};
 use super::scene::Scene;
@@ -290,7 +290,9 @@ fn checks(s: &Value) -> Section {
         ),
     ] {
         if let Some(value) = at(s, key) {
-            section.tables.push(super::facts::facts_table(caption, value));
+            section
+                .tables
+                .push(super::facts::facts_table(caption, value, Digits::Few));
         }
     }
     section

@@ -186,6 +186,9 @@ impl Scene {
     }
 
     /// Adds sheets, curves and nodes of a scaffold, moved by `motion` (the identity for a shape in its own place).
+    ///
+    /// Of a second shape (`source`, `followup`) only axial curves and wires are shown at first: two sets of sheets in one
+    /// place hide each other.
     pub fn add_scaffold(&mut self, shape: &str, scaffold: &CoarseScaffold, motion: &Rigid) {
         let diagonal = if scaffold.diagonal_mm > 0.0 {
             scaffold.diagonal_mm
@@ -200,6 +203,7 @@ impl Scene {
             }
         };
         let range = sheet_radius_range(scaffold);
+        let first = self.layers.len();
         for s in &scaffold.sheets {
             let mut mesh = TriangleMesh {
                 points: s.mesh.vertices.iter().map(|v| motion.apply(v.position)).collect(),
@@ -243,6 +247,11 @@ impl Scene {
                 })),
                 visible: true,
             });
+        }
+        if shape == "source" || shape == "followup" {
+            for layer in &mut self.layers[first..] {
+                layer.visible = matches!(layer.kind, LayerKind::Axial | LayerKind::Wire);
+            }
         }
     }
 
