@@ -42,8 +42,7 @@ pub struct SamplingSettings {
     /// Label of a label map; `None` takes all labels as one solid.
     pub label: Option<i32>,
     /// Smoothing passes on the surface of a label map; 0 keeps the voxel stairs. On voxelised balls of 16 to 64 voxels 20 passes
-    /// halve the stairs (0.20 to 0.09 voxels rms) and bring the volume from -1.0 ... -0.1 % to within 0.1 % of the truth;
-    /// more passes make it grow.
+    /// halve the stairs (0.20 to 0.09 voxels rms) and nearly keep the volume; more passes make it grow.
     pub smoothing_passes: u32,
     /// Seed of the sampling.
     pub seed: u64,
