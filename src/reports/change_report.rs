@@ -10,7 +10,9 @@ use super::mesh_files::{PlyEncoding, VertexField, write_ply};
 use super::page::{KeyFigure, NoteLevel, Plot, Report, ReportError, Section, Table};
 use super::plot::{IntervalRow, interval_plot, pretty, signed};
 use super::scene::{Layer, LayerKind, Quantity, Scene};
+use super::still::View;
 use crate::change::{Change, LesionChange};
+use glam::DVec3;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
@@ -88,6 +90,22 @@ pub fn change_scene(change: &Change) -> Scene {
     scene
 }
 
+/// The usual view, from the side where the surfaces moved most.
+fn toward_growth(scene: &Scene) -> View {
+    let mut view = View::broadside(scene);
+    let mut moved = DVec3::ZERO;
+    for layer in &scene.layers {
+        let Some(q) = &layer.quantity else { continue };
+        for (normal, h) in layer.mesh.vertex_normals().iter().zip(&q.values) {
+            moved += f64::from(h * h) * *normal;
+        }
+    }
+    if moved.dot(view.toward_camera) < 0.0 {
+        view.toward_camera = -view.toward_camera;
+    }
+    view
+}
+
 /// Writes a lesion's growth map (`growth_<label>.ply`): baseline surface with `growth` a vertex, mm, outward positive.
 ///
 /// # Errors
@@ -121,6 +139,7 @@ pub fn change_report(title: &str, change: &Value, run: &Value, scene: Scene) -> 
             .layers
             .iter()
             .find_map(|l| l.quantity.as_ref().map(|q| q.name.clone())),
+        view: Some(toward_growth(&scene)),
         scene,
         result: change.clone(),
         run: run.clone(),

@@ -136,9 +136,10 @@ pub fn run_section(run: &Value) -> Section {
             }
         }
     }
-    section
-        .tables
-        .push(facts_table("Run", &Value::Object(general), Digits::All));
+    if !general.is_empty() {
+        let general = Value::Object(general);
+        section.tables.push(facts_table("Run", &general, Digits::All));
+    }
     for (key, caption) in [("inputs", "Inputs"), ("settings", "Settings, defaults filled in")] {
         if let Some(value) = map.get(key) {
             section.tables.push(facts_table(caption, value, Digits::All));
