@@ -199,23 +199,44 @@ fn check_all_pairs(most: usize) {
         .collect();
     for (k, (n, te)) in graphs.iter().enumerate() {
         for (m, se) in &graphs[..=k] {
-            let (g, h) = (ordinary(*n, te), ordinary(*m, se));
-            let zero = |kind| Table::zeros(g.count(kind), h.count(kind));
-            let costs = ElementCosts {
-                nodes: zero(Kind::Node),
-                curves: zero(Kind::Curve),
-                sheets: zero(Kind::Sheet),
-            };
-            let problem = MatchingProblem::new(&g, &h, &costs, &EvidenceSettings::default()).unwrap();
-            let truth = exhaustive_ordinary(&problem, &maps[*n][*m]);
-            let d = edit_distance(&g, &h, &costs, &plain()).unwrap();
-            assert!(d.exact, "{te:?} {se:?}");
-            assert!(
-                (d.upper_bound - truth).abs() < 1e-9,
-                "{te:?} {se:?}: {} {truth}",
-                d.upper_bound
-            );
-            assert!(root_lower_bound(&problem) <= truth + 1e-9);
+            check_pair((*n, te), (*m, se), &maps[*n][*m]);
+        }
+    }
+}
+
+fn check_pair((n, te): (usize, &[(u32, u32)]), (m, se): (usize, &[(u32, u32)]), maps: &[Vec<Option<u32>>]) {
+    let (g, h) = (ordinary(n, te), ordinary(m, se));
+    let zero = |kind| Table::zeros(g.count(kind), h.count(kind));
+    let costs = ElementCosts {
+        nodes: zero(Kind::Node),
+        curves: zero(Kind::Curve),
+        sheets: zero(Kind::Sheet),
+    };
+    let problem = MatchingProblem::new(&g, &h, &costs, &EvidenceSettings::default()).unwrap();
+    let truth = exhaustive_ordinary(&problem, maps);
+    let d = edit_distance(&g, &h, &costs, &plain()).unwrap();
+    assert!(d.exact, "{te:?} {se:?}");
+    assert!(
+        (d.upper_bound - truth).abs() < 1e-9,
+        "{te:?} {se:?}: {} {truth}",
+        d.upper_bound
+    );
+    assert!(root_lower_bound(&problem) <= truth + 1e-9);
+}
+
+/// A sample of the pairs of 5 and 6 nodes.
+#[test]
+fn equals_exhaustive_search_on_random_pairs_of_six_nodes() {
+    let mut rng = ChaCha8Rng::seed_from_u64(17);
+    let random = |rng: &mut ChaCha8Rng, n: u32| -> Vec<(u32, u32)> {
+        let pairs = (0..n).flat_map(|a| (0..a).map(move |b| (b, a)));
+        pairs.filter(|_| rng.random::<f64>() < 0.5).collect()
+    };
+    for (n, m) in [(5, 5), (5, 6), (6, 6)] {
+        let maps = partial_maps(n, m);
+        for _ in 0..8 {
+            let (te, se) = (random(&mut rng, n as u32), random(&mut rng, m as u32));
+            check_pair((n, &te), (m, &se), &maps);
         }
     }
 }
