@@ -63,10 +63,10 @@ fn figures(report: &mut Report, r: &Value, motion: &Rigid) {
     }
     if let Some(v) = number(r, "difference.volume_change_percent") {
         report.figures.push(
-            KeyFigure::new("Volume, source to target", signed(v), "%").note(format!(
+            KeyFigure::new("Volume, target to source", signed(v), "%").note(format!(
                 "{} \u{2192} {} mm\u{b3}",
-                shown(r, "difference.volume_source"),
-                shown(r, "difference.volume_target")
+                shown(r, "difference.volume_target"),
+                shown(r, "difference.volume_source")
             )),
         );
     }
