@@ -249,17 +249,25 @@ mod tests {
 
     #[test]
     fn a_sampled_distance_gives_a_ball_to_second_order() {
-        let n = 40;
-        let (c, r) = (DVec3::splat(19.3), 14.0);
-        let values = (0..n * n * n)
-            .map(|v| {
-                let p = DVec3::new((v % n) as f64, (v / n % n) as f64, (v / n / n) as f64);
-                (0.5 + r - p.distance(c)) as f32
-            })
-            .collect();
-        let mesh = marching_cubes(&Field { dims: [n; 3], values });
-        let truth = 4.0 / 3.0 * std::f64::consts::PI * r * r * r;
-        assert!((mesh.signed_volume() / truth - 1.0).abs() < 2e-3);
-        assert!((mesh.area() / (3.0 * truth / r) - 1.0).abs() < 2e-3);
+        // Chords and linear crossings are off by a share of (voxel / radius)^2: a quarter at twice the radius.
+        let off = |n: usize, c: f64, r: f64| {
+            let values = (0..n * n * n)
+                .map(|v| {
+                    let p = DVec3::new((v % n) as f64, (v / n % n) as f64, (v / n / n) as f64);
+                    (0.5 + r - p.distance(DVec3::splat(c))) as f32
+                })
+                .collect();
+            let mesh = marching_cubes(&Field { dims: [n; 3], values });
+            let truth = 4.0 / 3.0 * std::f64::consts::PI * r * r * r;
+            [
+                mesh.signed_volume() / truth - 1.0,
+                mesh.area() / (3.0 * truth / r) - 1.0,
+            ]
+        };
+        let (coarse, fine) = (off(20, 9.3, 7.0), off(40, 19.3, 14.0));
+        for (coarse, fine) in coarse.into_iter().zip(fine) {
+            assert!(fine.abs() < 5e-3, "{fine}");
+            assert!((3.0..5.0).contains(&(coarse / fine)), "{coarse} {fine}");
+        }
     }
 }
