@@ -70,11 +70,9 @@ pub struct ClosureSettings<'a> {
     pub least_component_share: f64,
     /// Triangles that are known to be surface, by point.
     pub preset: &'a [[u32; 3]],
-    /// Whether step 6 may drop points.
-    pub drop_points: bool,
 }
 
-/// Labels the tetrahedra of distinct points in lexicographic order; see the module.
+/// Steps 1 to 5 for distinct points in lexicographic order; see the module.
 ///
 /// # Errors
 /// [`SegregationError::FewPoints`] when they do not span space, [`SegregationError::Triangulation`] when they are refused.
@@ -83,8 +81,21 @@ pub fn close(
     spacing_mm: &[f64],
     settings: &ClosureSettings,
 ) -> Result<Closure, SegregationError> {
-    let first = close_once(points, spacing_mm, settings)?;
-    if first.off == 0 || !settings.drop_points {
+    close_once(points, spacing_mm, settings)
+}
+
+/// Step 6: closes once more without the points that `first` left off its surface. For closed shapes only: the closed surface
+/// of an open one passes many of its points by.
+///
+/// # Errors
+/// As [`close`].
+pub fn close_without_off(
+    first: Closure,
+    points: &[DVec3],
+    spacing_mm: &[f64],
+    settings: &ClosureSettings,
+) -> Result<Closure, SegregationError> {
+    if first.off == 0 {
         return Ok(first);
     }
     let off = points_off(&first.triangulation, &first.inside);
@@ -99,13 +110,13 @@ pub fn close(
         .map(|t| t.map(|i| place[i as usize]))
         .filter(|t| !t.contains(&u32::MAX))
         .collect();
-    let pick = |values: &[f64]| used.iter().map(|&i| values[i as usize]).collect::<Vec<_>>();
     let kept: Vec<DVec3> = used.iter().map(|&i| points[i as usize]).collect();
+    let kept_spacing: Vec<f64> = used.iter().map(|&i| spacing_mm[i as usize]).collect();
     let again = ClosureSettings {
         preset: &preset,
         ..*settings
     };
-    let second = close_once(&kept, &pick(spacing_mm), &again)?;
+    let second = close_once(&kept, &kept_spacing, &again)?;
     Ok(Closure {
         used,
         dropped: first.off,

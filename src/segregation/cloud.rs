@@ -12,7 +12,7 @@
 //!
 //! Cost: `O(n log n)` in practice.
 
-use super::closure::{Closure, ClosureSettings, close};
+use super::closure::{Closure, ClosureSettings, close, close_without_off, preset_facets};
 use super::error::SegregationError;
 use super::gap_transforms::CostRule;
 use super::labels::{Segregation, boundary_triangles};
@@ -24,6 +24,7 @@ use crate::delaunay::Triangulation;
 use crate::geometry::{Neighbours, TriangleMesh, VertexId};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 
 /// Whether noise may be removed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -140,17 +141,68 @@ pub fn segregate_cloud(
     check(points)?;
     let cleaned = clean(points, settings);
     let prepared = thin_out(&cleaned, settings.seed);
-    let closure = close_prepared(&prepared, settings)?;
-    let chosen = with_second_opinions(
-        Run {
+    let closure = close_prepared(&prepared, &[], settings)?;
+    let first = Run {
+        prepared,
+        closure,
+        seed: settings.seed,
+    };
+    let chosen = with_second_opinions(first, &cleaned, settings)?;
+    finish(points, chosen, &BTreeSet::new(), settings)
+}
+
+/// A cloud some of whose surface is known.
+pub(super) struct PresetOutcome {
+    pub cloud: CloudSegregation,
+    /// The given triangles that are Delaunay facets, by input point, sorted.
+    pub preset_facets: BTreeSet<[u32; 3]>,
+}
+
+/// As [`segregate_cloud`] with triangles (by input point) that are known to be surface. Points are not moved.
+pub(super) fn segregate_with_preset(
+    points: &[DVec3],
+    triangles: &[[u32; 3]],
+    settings: &SegregationSettings,
+) -> Result<PresetOutcome, SegregationError> {
+    let cleaned = clean(points, settings);
+    let prepared = thin_out(&cleaned, settings.seed);
+    let mut place = vec![u32::MAX; points.len()];
+    for (new, &old) in prepared.source.iter().enumerate() {
+        place[old as usize] = new as u32;
+    }
+    let preset: Vec<[u32; 3]> = triangles.iter().map(|t| t.map(|i| place[i as usize])).collect();
+    let closure = close_prepared(&prepared, &preset, settings)?;
+    let known: BTreeSet<[u32; 3]> = preset_facets(&closure.triangulation, &preset)
+        .into_iter()
+        .map(|f| sorted(closure.triangulation.facet_vertices(f)))
+        .collect();
+    let preset_facets = known
+        .iter()
+        .map(|t| {
+            let mut t = t.map(|v| prepared.source[v as usize]);
+            t.sort_unstable();
+            t
+        })
+        .collect();
+    let chosen = Chosen {
+        run: Run {
             prepared,
             closure,
             seed: settings.seed,
         },
-        &cleaned,
-        settings,
-    )?;
-    finish(points, chosen, settings)
+        opinions: Vec::new(),
+        disagreement: false,
+    };
+    Ok(PresetOutcome {
+        cloud: finish(points, chosen, &known, settings)?,
+        preset_facets,
+    })
+}
+
+fn sorted(t: [VertexId; 3]) -> [u32; 3] {
+    let mut t = t.map(|v| v.0);
+    t.sort_unstable();
+    t
 }
 
 pub(super) fn check(points: &[DVec3]) -> Result<(), SegregationError> {
@@ -181,17 +233,54 @@ struct Chosen {
     disagreement: bool,
 }
 
-fn close_prepared(prepared: &Prepared, settings: &SegregationSettings) -> Result<Closure, SegregationError> {
-    close(
-        &prepared.points,
-        &prepared.spacing_mm,
-        &ClosureSettings {
-            cost: settings.cost,
-            least_component_share: settings.least_component_share,
-            preset: &[],
-            drop_points: settings.denoise != Denoise::Off,
-        },
-    )
+fn close_prepared(
+    prepared: &Prepared,
+    preset: &[[u32; 3]],
+    settings: &SegregationSettings,
+) -> Result<Closure, SegregationError> {
+    let closing = ClosureSettings {
+        cost: settings.cost,
+        least_component_share: settings.least_component_share,
+        preset,
+    };
+    let first = close(&prepared.points, &prepared.spacing_mm, &closing)?;
+    let judged = Judged::new(&first, &BTreeSet::new());
+    if settings.denoise == Denoise::Off || !judged.decide(settings).closed {
+        return Ok(first);
+    }
+    close_without_off(first, &prepared.points, &prepared.spacing_mm, &closing)
+}
+
+/// A closed surface and which of its triangles points support.
+struct Judged {
+    triangles: Vec<[VertexId; 3]>,
+    raw: Vec<[u32; 3]>,
+    bare: Vec<bool>,
+    share: f64,
+}
+
+impl Judged {
+    /// Triangles in `known` (sorted corners) count as supported.
+    fn new(closure: &Closure, known: &BTreeSet<[u32; 3]>) -> Self {
+        let triangles = boundary_triangles(&closure.triangulation, &closure.inside);
+        let raw: Vec<[u32; 3]> = triangles.iter().map(|t| t.map(|v| v.0)).collect();
+        let points = &closure.triangulation.points;
+        let mut bare = unsupported(points, &raw, &closure.spacing_mm);
+        for (mark, t) in bare.iter_mut().zip(&triangles) {
+            *mark &= known.is_empty() || !known.contains(&sorted(*t));
+        }
+        let share = area_share(points, &raw, &bare);
+        Self {
+            triangles,
+            raw,
+            bare,
+            share,
+        }
+    }
+
+    fn decide(&self, settings: &SegregationSettings) -> Decision {
+        decide(self.share, self.raw.is_empty(), settings)
+    }
 }
 
 fn opinion(run: &Run) -> SecondOpinion {
@@ -230,7 +319,7 @@ fn with_second_opinions(
     for k in 1..3u64 {
         let seed = settings.seed.wrapping_add(k);
         let prepared = thin_out(cleaned, seed);
-        let closure = close_prepared(&prepared, settings)?;
+        let closure = close_prepared(&prepared, &[], settings)?;
         runs.push(Run {
             prepared,
             closure,
@@ -258,6 +347,7 @@ fn with_second_opinions(
 fn finish(
     points: &[DVec3],
     chosen: Chosen,
+    known: &BTreeSet<[u32; 3]>,
     settings: &SegregationSettings,
 ) -> Result<CloudSegregation, SegregationError> {
     let Chosen {
@@ -267,11 +357,8 @@ fn finish(
         opinions,
         disagreement,
     } = chosen;
-    let closed_triangles = boundary_triangles(&closure.triangulation, &closure.inside);
-    let raw: Vec<[u32; 3]> = closed_triangles.iter().map(|t| t.map(|v| v.0)).collect();
-    let bare = unsupported(&closure.triangulation.points, &raw, &closure.spacing_mm);
-    let share = area_share(&closure.triangulation.points, &raw, &bare);
-    let decision = decide(share, raw.is_empty(), settings);
+    let judged = Judged::new(&closure, known);
+    let decision = judged.decide(settings);
     let mut report = CloudReport {
         prepare: prepared.report.clone(),
         second_opinions: opinions,
@@ -280,9 +367,9 @@ fn finish(
         ..Default::default()
     };
     let mut segregation = if decision.closed {
-        report.filled_holes = patches(&closure.triangulation.points, &raw, &bare);
+        report.filled_holes = patches(&closure.triangulation.points, &judged.raw, &judged.bare);
         Segregation {
-            triangles: closed_triangles,
+            triangles: judged.triangles,
             inside: closure.inside.clone(),
             closed: true,
             warnings: Vec::new(),
@@ -408,7 +495,14 @@ fn closing_report(closure: &Closure, prepared: usize) -> ClosingReport {
 fn doubts(report: &CloudReport, disagreement: bool, settings: &SegregationSettings) -> Vec<String> {
     let mut out = Vec::new();
     let share = report.decision.unsupported_area_share;
-    if report.decision.closed && share >= NEAR_THRESHOLD * settings.open_area_share {
+    let factor = share / settings.open_area_share;
+    if !report.decision.closed && !report.decision.by_user && share > 0.0 && factor < 1.0 / NEAR_THRESHOLD {
+        out.push(format!(
+            "taken as open although only {:.2} % of its area has no points to support it: say which it is",
+            100.0 * share
+        ));
+    }
+    if report.decision.closed && factor >= NEAR_THRESHOLD {
         out.push(format!(
             "{:.2} % of the surface has no points to support it: compare the list of filled holes with the object",
             100.0 * share

@@ -8,6 +8,7 @@
 //! * [`cloud`]: a raw cloud is prepared ([`prepare`]: outliers, noise), shows its surface by greedy gap transforms
 //!   ([`gap_transforms`]), is closed ([`closure`]: [`diffusion`], [`min_cut`], [`islands`], [`star_repair`], [`adopt`]),
 //!   judged open or closed ([`openness`]), oriented ([`orient`]) and reported ([`report`]).
+//! * [`mesh_repair`]: a damaged mesh keeps its good triangles; the rest is found anew from its points.
 
 pub mod adopt;
 pub mod balls;
@@ -22,6 +23,7 @@ pub mod islands;
 pub mod known_queries;
 pub mod known_surface;
 pub mod labels;
+pub mod mesh_repair;
 pub mod min_cut;
 pub mod openness;
 pub mod orient;
@@ -41,5 +43,6 @@ pub use known_surface::{
     segregate_known,
 };
 pub use labels::{Segregation, boundary_facets, boundary_triangles};
+pub use mesh_repair::{Change, ChangeKind, MeshRepair, MeshRepairReport, segregate_mesh};
 pub use refine::{RefinedSegregation, segregate_known_refined};
 pub use report::CloudReport;

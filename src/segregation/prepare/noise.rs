@@ -40,6 +40,8 @@ pub struct NoiseLevel {
 /// How a level of noise is removed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SmoothingPlan {
+    /// The level: noise standard deviation over local spacing.
+    pub noise_over_spacing: f64,
     /// Moving-least-squares passes.
     pub passes: usize,
     /// Neighbours in a pass.
@@ -53,6 +55,7 @@ pub struct SmoothingPlan {
 pub fn plan(noise_over_spacing: f64) -> Option<SmoothingPlan> {
     let plan = |passes, neighbours, thinning| {
         Some(SmoothingPlan {
+            noise_over_spacing,
             passes,
             neighbours,
             thinning,
