@@ -324,24 +324,6 @@ fn a_moebius_band_stays_one_sided_with_one_rim() {
 }
 
 #[test]
-fn two_close_sheets_stay_two() {
-    // Two parallel square sheets, seven spacings apart: nothing may join them.
-    let points = patch(4000, 3, |u, v| {
-        let upper = u > 0.5;
-        DVec3::new(
-            if upper { 2.0 * u - 1.0 } else { 2.0 * u },
-            v,
-            if upper { 0.15 } else { 0.0 },
-        )
-    });
-    let r = cloud(&points);
-    println!("two sheets: {}", describe(&r));
-    assert!(!r.segregation.closed);
-    assert_eq!(r.report.topology.components, 2, "{}", describe(&r));
-    assert_eq!(r.report.rims.len(), 2, "{}", describe(&r));
-}
-
-#[test]
 fn crossing_planes_keep_their_crossing() {
     let points = patch(4000, 4, |u, v| {
         if u > 0.5 {

@@ -95,10 +95,8 @@ pub fn segregate_mesh(
         let key = sorted(t);
         if (b - a).cross(c - a) == DVec3::ZERO {
             kinds[i] = Some(ChangeKind::Degenerate);
-        } else if first.contains_key(&key) {
+        } else if *first.entry(key).or_insert(i as u32) != i as u32 {
             kinds[i] = Some(ChangeKind::Duplicate);
-        } else {
-            first.insert(key, i as u32);
         }
     }
     let preset: Vec<[u32; 3]> = first.keys().copied().collect();
