@@ -123,7 +123,7 @@ pub fn write(out: &mut impl Write, mask: &LabelMask) -> io::Result<()> {
 /// Writes a mask to a file; compressed when the name ends in `.gz` (no time stamp, so equal masks give equal bytes).
 ///
 /// # Errors
-/// Those of the file system and of [`write`].
+/// Those of the file system and of [`write()`].
 pub fn save(path: &Path, mask: &LabelMask) -> io::Result<()> {
     let mut file = BufWriter::new(File::create(path)?);
     if path.extension().is_some_and(|e| e == "gz") {

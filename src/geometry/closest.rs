@@ -1,7 +1,7 @@
 //! The closest point of a triangle mesh, and signed distance to a closed one.
 //!
 //! In: a mesh and queries in mm. Out: the closest surface point, its triangle, the squared distance; with a
-//! [`WindingNumber`](super::winding::WindingNumber) beside it, a sign that is right on closed meshes however sharp their edges
+//! [`WindingNumber`] beside it, a sign that is right on closed meshes however sharp their edges
 //! (pseudo-normals fail where a surface touches itself, the winding number does not).
 //!
 //! 1. parry's bounding-volume hierarchy prunes; boxes are f64.

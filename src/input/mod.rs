@@ -4,7 +4,7 @@
 //! * `formats`: one reader a format, on a cursor that knows its place (`scan`, `scalar`, `decompress`).
 //! * [`error`]: what can be wrong and how it is said.
 //! * [`shape`]: what comes out.
-//! * [`check`]: what is in a file and is it usable. [`repair`]: only when asked, with a list of what was changed.
+//! * [`mod@check`]: what is in a file and is it usable. [`mod@repair`]: only when asked, with a list of what was changed.
 //! * [`sampling`]: from a shape to generators.
 
 pub mod check;

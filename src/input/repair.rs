@@ -12,7 +12,7 @@
 //!    relative to the outermost (a cavity stays a cavity), and becomes a cavity when the file gave it none.
 //! 5. Points that no face uses are dropped.
 //!
-//! Nothing is added: holes stay holes and edges with three faces stay so; [`super::check`] names them.
+//! Nothing is added: holes stay holes and edges with three faces stay so; [`mod@super::check`] names them.
 //! Cost `O(n log n)`, and `O(c)` winding numbers for each of `c` closed components.
 
 use crate::geometry::{Neighbours, TriangleMesh, WindingNumber, mesh::DisjointSets};

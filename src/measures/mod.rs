@@ -1,6 +1,6 @@
 //! Measures: what a scaffold says of its shape in the units users ask for.
 //!
-//! * [`thickness`]: twice the radius of the medial ball that touches each surface point.
+//! * [`mod@thickness`]: twice the radius of the medial ball that touches each surface point.
 
 pub mod thickness;
 

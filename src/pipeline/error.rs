@@ -17,7 +17,7 @@ pub struct PipelineError {
     pub shape: String,
     /// What the stage said.
     #[source]
-    pub source: StageError,
+    pub source: Box<StageError>,
 }
 
 /// The error of one stage.
@@ -45,7 +45,7 @@ impl StageError {
     pub(super) fn of(self, shape: &str) -> PipelineError {
         PipelineError {
             shape: shape.to_owned(),
-            source: self,
+            source: Box::new(self),
         }
     }
 }

@@ -8,8 +8,8 @@
 //! - [`colour`], [`scene`], [`glb`]: what is shown in 3D, as layers and as binary glTF;
 //! - [`still`], [`plot`]: pictures without a GPU, plots as SVG;
 //! - [`page`]: one offline HTML page with viewer, tables and data inside;
-//! - [`facts`], [`scaffold_report`], [`match_report`], [`change_report`]: the pages of the commands, from their JSON;
-//! - [`rebuild`]: a page again from the files of a run.
+//! - [`facts`], [`mod@scaffold_report`], [`mod@match_report`], [`mod@change_report`]: the pages of the commands, from their JSON;
+//! - [`mod@rebuild`]: a page again from the files of a run.
 //!
 //! Coordinates are LPS mm in every file, and every format that can say so does. Bytes depend on the data alone.
 

@@ -2,7 +2,7 @@
 //!
 //! In: generators and the closed surface they lie on. Out: the refined generators' triangulation, its segregation, and how
 //! many points were added. Each round triangulates, segregates, and adds the places that
-//! [`segregate_known`](super::segregate_known) lists: crossings of the surface with curves of the full scaffold that cross
+//! [`segregate_known`] lists: crossings of the surface with curves of the full scaffold that cross
 //! it more than once, farthest from the generators by construction (Boissonnat & Oudot 2005). It ends when the topology
 //! agrees, nothing is left to add, or a limit is reached; then the best round is returned and its warnings say what was not
 //! resolved.

@@ -27,7 +27,7 @@ impl Default for RigidMotion {
 }
 
 impl RigidMotion {
-    /// Rotation about an axis through a point [rad].
+    /// Rotation about an axis through a point (rad).
     pub fn about(point: DVec3, axis: DVec3, angle: f64) -> Self {
         let rotation = DMat3::from_axis_angle(axis.normalize(), angle);
         RigidMotion {
@@ -85,7 +85,7 @@ impl RigidMotion {
         ]
     }
 
-    /// Angle of the rotation between two motions [degrees], by the Frobenius norm, which keeps its digits near 0.
+    /// Angle of the rotation between two motions (degrees), by the Frobenius norm, which keeps its digits near 0.
     pub fn rotation_error_deg(&self, other: &RigidMotion) -> f64 {
         let d = self.rotation - other.rotation;
         let frobenius =

@@ -125,7 +125,7 @@ pub enum Field {
     Relief {
         /// What is made uneven.
         of: Arc<Field>,
-        /// Waves: vector [rad/mm], phase [rad] and amplitude [mm].
+        /// Waves: vector [rad/mm], phase (rad) and amplitude (mm).
         waves: Arc<Vec<(DVec3, f64, f64)>>,
     },
     /// The image of a solid under a smooth map.
