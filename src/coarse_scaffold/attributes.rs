@@ -6,6 +6,7 @@ use crate::fine_scaffold::complex::NONE;
 use crate::geometry::{CurveId, SheetId};
 use glam::DVec3;
 use nalgebra::{Matrix3, SymmetricEigen};
+use std::collections::BTreeMap;
 
 /// Length of a polyline, mm; a closed one returns to its start.
 pub(crate) fn length(polyline: &[MedialPoint], closed: bool) -> f64 {
@@ -19,38 +20,100 @@ pub(crate) fn length(polyline: &[MedialPoint], closed: bool) -> f64 {
     }
 }
 
-/// Smooths positions and radii along a curve over about `width_mm` by shrink-free pairs of passes (Taubin, "A signal processing
-/// approach to fair surface design", 1995); the ends of an open curve stay.
+/// Smooths positions and radii along a curve with a Gaussian of standard deviation `width_mm` over arc length; the ends of an
+/// open curve stay, because the curve is continued beyond them by its point reflection.
 pub(crate) fn smooth(polyline: &mut [MedialPoint], closed: bool, width_mm: f64) {
-    const SHRINK: f64 = 0.5;
-    const GROW: f64 = -0.53;
-    const MAX_PASSES: f64 = 300.0;
+    const CUT: f64 = 2.5;
     let n = polyline.len();
-    if n < 3 {
+    if n < 3 || width_mm <= 0.0 {
         return;
     }
-    // A pass averages over one step either way; k passes over the square root of k.
-    let step = length(polyline, closed) / n as f64;
-    let passes = (width_mm / step).powi(2).min(MAX_PASSES);
-    let mut next = polyline.to_vec();
-    for factor in std::iter::repeat_n([SHRINK, GROW], passes as usize).flatten() {
-        for i in 0..n {
-            if !closed && (i == 0 || i == n - 1) {
-                continue;
-            }
-            let (a, b, p) = (polyline[(i + n - 1) % n], polyline[(i + 1) % n], polyline[i]);
-            next[i] = MedialPoint {
-                position: p.position + factor * (0.5 * (a.position + b.position) - p.position),
-                radius: p.radius + factor * (0.5 * (a.radius + b.radius) - p.radius),
-            };
-        }
-        polyline.copy_from_slice(&next);
+    let mut at = vec![0.0; n];
+    for i in 1..n {
+        at[i] = at[i - 1] + polyline[i].position.distance(polyline[i - 1].position);
     }
+    let round = at[n - 1] + polyline[n - 1].position.distance(polyline[0].position);
+    // A kernel wider than a third of the curve would see the curve twice.
+    let whole = if closed { round } else { at[n - 1] };
+    let width = width_mm.min(whole / 6.0);
+    // Point k of the endless continuation: arc length, position and radius.
+    let (first, last) = (polyline[0], polyline[n - 1]);
+    let point = |k: isize| -> (f64, DVec3, f64) {
+        let m = n as isize;
+        if closed {
+            let turn = k.div_euclid(m);
+            let p = polyline[k.rem_euclid(m) as usize];
+            (
+                at[k.rem_euclid(m) as usize] + turn as f64 * round,
+                p.position,
+                p.radius,
+            )
+        } else if k < 0 {
+            let p = polyline[(-k).min(m - 1) as usize];
+            let s = at[(-k).min(m - 1) as usize];
+            (
+                -s,
+                2.0 * first.position - p.position,
+                2.0 * first.radius - p.radius,
+            )
+        } else if k >= m {
+            let i = (2 * (m - 1) - k).max(0) as usize;
+            let p = polyline[i];
+            let s = 2.0 * at[n - 1] - at[i];
+            (s, 2.0 * last.position - p.position, 2.0 * last.radius - p.radius)
+        } else {
+            let p = polyline[k as usize];
+            (at[k as usize], p.position, p.radius)
+        }
+    };
+    let smoothed: Vec<MedialPoint> = (0..n)
+        .map(|i| {
+            if !closed && (i == 0 || i == n - 1) {
+                return polyline[i];
+            }
+            let here = at[i];
+            let (mut weight, mut position, mut radius) = (0.0, DVec3::ZERO, 0.0);
+            let mut add = |k: isize| {
+                let (s, p, r) = point(k);
+                let x = (s - here) / width;
+                // Each point stands for half the way to its neighbours.
+                let share = 0.5 * (point(k + 1).0 - point(k - 1).0);
+                let w = share * (-0.5 * x * x).exp();
+                weight += w;
+                position += w * p;
+                radius += w * r;
+                x.abs() < CUT
+            };
+            let (mut up, mut down) = (i as isize, i as isize - 1);
+            let limit = 2 * n as isize - 2;
+            while add(up) && up - (i as isize) < limit {
+                up += 1;
+            }
+            while add(down) && (i as isize) - down < limit {
+                down -= 1;
+            }
+            if weight > 0.0 {
+                MedialPoint {
+                    position: position / weight,
+                    radius: (radius / weight).max(0.0),
+                }
+            } else {
+                polyline[i]
+            }
+        })
+        .collect();
+    polyline.copy_from_slice(&smoothed);
 }
 
 /// A sheet with everything but its boundary and shares.
-pub(crate) fn sheet(fine: &FineScaffold, index: usize, facets: &[u32], persistence: f64) -> Sheet {
-    let mesh = mesh(fine, facets);
+pub(crate) fn sheet(
+    fine: &FineScaffold,
+    index: usize,
+    facets: &[u32],
+    persistence: f64,
+    border: &BTreeMap<u32, MedialPoint>,
+) -> Sheet {
+    let mesh = mesh(fine, facets, border);
     let point = |i: u32| mesh.vertices[i as usize];
     let (mut area, mut weighted_radius, mut first) = (0.0, 0.0, DVec3::ZERO);
     let origin = mesh.vertices.first().map_or(DVec3::ZERO, |p| p.position);
@@ -116,8 +179,14 @@ fn moments(mesh: &SheetMesh, centroid: DVec3, area: f64) -> SheetMoments {
     }
 }
 
-/// The facets as a fan of triangles each, over shared vertices.
-fn mesh(fine: &FineScaffold, facets: &[u32]) -> SheetMesh {
+/// Rings of vertices behind the border that give way when the border is moved to the smooth curves.
+const GIVE_WAY: u32 = 5;
+/// Passes of relaxation of those vertices.
+const RELAX: u32 = 30;
+
+/// The facets as a fan of triangles each, over shared vertices; vertices on the border sit on the smooth curves, and those near
+/// them are relaxed.
+fn mesh(fine: &FineScaffold, facets: &[u32], border: &BTreeMap<u32, MedialPoint>) -> SheetMesh {
     let mut used: Vec<u32> = facets
         .iter()
         .flat_map(|&f| fine.facet_vertices(f as usize).iter().copied())
@@ -132,16 +201,53 @@ fn mesh(fine: &FineScaffold, facets: &[u32]) -> SheetMesh {
             (1..ring.len() - 1).map(|k| [slot(ring[0]), slot(ring[k]), slot(ring[k + 1])])
         })
         .collect();
-    SheetMesh {
-        vertices: used
-            .iter()
-            .map(|&v| MedialPoint {
-                position: fine.vertex_position[v as usize],
-                radius: fine.vertex_radius[v as usize],
-            })
-            .collect(),
-        triangles,
+    let mut vertices: Vec<MedialPoint> = used
+        .iter()
+        .map(|&v| MedialPoint {
+            position: fine.vertex_position[v as usize],
+            radius: fine.vertex_radius[v as usize],
+        })
+        .collect();
+    let mut near: Vec<[u32; 2]> = facets
+        .iter()
+        .flat_map(|&f| fine.facet_edges(f as usize))
+        .map(|&e| fine.edge_vertices[e as usize].map(slot))
+        .flat_map(|[a, b]| [[a, b], [b, a]])
+        .collect();
+    near.sort_unstable();
+    near.dedup();
+    // Steps from the border, up to the last ring that gives way.
+    let mut ring = vec![u32::MAX; used.len()];
+    for (i, v) in used.iter().enumerate() {
+        if let Some(&p) = border.get(v) {
+            ring[i] = 0;
+            vertices[i] = p;
+        }
     }
+    for step in 0..GIVE_WAY {
+        for &[a, b] in &near {
+            if ring[a as usize] == step && ring[b as usize] == u32::MAX {
+                ring[b as usize] = step + 1;
+            }
+        }
+    }
+    for _ in 0..RELAX {
+        let old = vertices.clone();
+        for own in near.chunk_by(|x, y| x[0] == y[0]) {
+            let i = own[0][0] as usize;
+            if ring[i] == 0 || ring[i] == u32::MAX {
+                continue;
+            }
+            let n = own.len() as f64;
+            let position: DVec3 = own.iter().map(|e| old[e[1] as usize].position).sum();
+            let radius: f64 = own.iter().map(|e| old[e[1] as usize].radius).sum();
+            vertices[i] = MedialPoint {
+                position: 0.5 * (old[i].position + position / n),
+                radius: 0.5 * (old[i].radius + radius / n),
+            };
+        }
+    }
+    SheetMesh { vertices, triangles }
 }
 
 /// The boundary of each sheet as chains of curves that share nodes, the longest first.

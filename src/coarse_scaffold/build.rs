@@ -6,7 +6,7 @@
 //! 2. persistence: of a sheet its largest erosion thickness (ET), of an axial curve the largest third-highest ET along it, of a
 //!    wire the largest ET of its vertices, of a rib that of its sheet, of a seam that of the axial curve it goes on from.
 //!    What no fire reaches (closed sheets, wires between other elements) cannot go at any price: it gets the diagonal;
-//! 3. attributes: polylines, lengths, areas, radii, moments, meshes;
+//! 3. [`super::ribs`]: ribs smoothed and fitted; attributes: polylines, lengths, areas, radii, moments, meshes;
 //! 4. the generator map: the sheet that most of a generator's Voronoi facets by area belong to, else what holds the nearest ball.
 //!
 //! Cost `O(n log n)`.
@@ -16,11 +16,13 @@ use super::generators::generator_hosts;
 use super::hypergraph::{CoarseScaffold, Curve, CurveKind, FineLinks, MedialPoint, Node, NodeKind, Sheet};
 use super::natural::natural_tolerances;
 use super::network::{Chain, Network};
+use super::ribs::fit_ribs;
 use super::settings::CoarseScaffoldSettings;
 use crate::fine_scaffold::FineScaffold;
 use crate::fine_scaffold::complex::NONE;
 use crate::geometry::{CurveId, NodeId, SheetId};
 use crate::regularise::Regularised;
+use std::collections::BTreeMap;
 
 /// Makes the coarse scaffold; see the module for what the attributes mean.
 ///
@@ -54,29 +56,41 @@ pub fn coarse_scaffold(
         .iter()
         .map(|facets| largest(facets.iter().map(|&f| regularised.erosion_mm[f as usize]), never))
         .collect();
-    let mut curves: Vec<Curve> = chains
+    let sheets_of_chain: Vec<Vec<SheetId>> = chains
         .iter()
-        .enumerate()
-        .map(|(i, chain)| {
-            let sheets: Vec<SheetId> = network
+        .map(|chain| {
+            network
                 .facets(chain.edges[0])
                 .map(|f| SheetId(sheet_of_facet[f as usize]))
-                .collect();
+                .collect()
+        })
+        .collect();
+    let lines = polylines(
+        fine,
+        regularised,
+        &chains,
+        &sheets_of_chain,
+        &sheet_facets,
+        &node_of_vertex,
+        settings,
+    );
+    let mut border: BTreeMap<u32, MedialPoint> = BTreeMap::new();
+    for (chain, line) in chains.iter().zip(&lines) {
+        border.extend(chain.vertices.iter().copied().zip(line.iter().copied()));
+    }
+    let mut curves: Vec<Curve> = chains
+        .iter()
+        .zip(sheets_of_chain)
+        .zip(lines)
+        .enumerate()
+        .map(|(i, ((chain, sheets), line))| {
             let persistence = match chain.kind {
                 CurveKind::Axial => largest(chain.edges.iter().map(|&e| third(&network, e)), never),
                 CurveKind::Rib => sheet_persistence[sheets[0].index()],
                 CurveKind::Wire => wire_persistence(regularised, chain, never),
                 CurveKind::Seam => 0.0,
             };
-            curve(
-                fine,
-                chain,
-                i,
-                sheets,
-                persistence,
-                &node_of_vertex,
-                settings.smoothing * tau,
-            )
+            curve(chain, i, sheets, persistence, &node_of_vertex, line)
         })
         .collect();
     let mut nodes = nodes(fine, &node_vertices, &curves);
@@ -93,7 +107,7 @@ pub fn coarse_scaffold(
     let mut sheets: Vec<Sheet> = sheet_facets
         .iter()
         .enumerate()
-        .map(|(i, facets)| attributes::sheet(fine, i, facets, sheet_persistence[i]))
+        .map(|(i, facets)| attributes::sheet(fine, i, facets, sheet_persistence[i], &border))
         .collect();
     attributes::boundaries(&mut sheets, &curves);
     let links = FineLinks {
@@ -157,43 +171,76 @@ fn seam_persistence(curves: &mut [Curve], nodes: &[Node]) {
     }
 }
 
-fn curve(
+/// The chains as polylines, smoothed, ribs fitted as well.
+fn polylines(
     fine: &FineScaffold,
+    regularised: &Regularised,
+    chains: &[Chain],
+    sheets_of_chain: &[Vec<SheetId>],
+    sheet_facets: &[Vec<u32>],
+    node_of_vertex: &[u32],
+    settings: &CoarseScaffoldSettings,
+) -> Vec<Vec<MedialPoint>> {
+    let width_mm = settings.smoothing * regularised.tolerance_mm;
+    let free: Vec<bool> = chains
+        .iter()
+        .map(|c| node_of_vertex[c.vertices[0] as usize] == NONE)
+        .collect();
+    let mut lines: Vec<Vec<MedialPoint>> = chains
+        .iter()
+        .zip(&free)
+        .map(|(chain, &free)| {
+            let points = &chain.vertices[..chain.vertices.len() - usize::from(free)];
+            let mut line: Vec<MedialPoint> = points
+                .iter()
+                .map(|&v| MedialPoint {
+                    position: fine.vertex_position[v as usize],
+                    radius: fine.vertex_radius[v as usize],
+                })
+                .collect();
+            if chain.kind != CurveKind::Rib {
+                attributes::smooth(&mut line, free, width_mm);
+            }
+            line
+        })
+        .collect();
+    let sheet_of_chain: Vec<Option<u32>> = sheets_of_chain.iter().map(|s| s.first().map(|s| s.0)).collect();
+    fit_ribs(
+        fine,
+        regularised,
+        chains,
+        &sheet_of_chain,
+        sheet_facets,
+        &mut lines,
+        &free,
+        width_mm,
+    );
+    lines
+}
+
+fn curve(
     chain: &Chain,
     index: usize,
     sheets: Vec<SheetId>,
     persistence: f64,
     node_of_vertex: &[u32],
-    smoothing_mm: f64,
+    polyline: Vec<MedialPoint>,
 ) -> Curve {
-    let (first, last) = (chain.vertices[0], chain.vertices[chain.vertices.len() - 1]);
-    let ends: Vec<NodeId> = [first, last]
+    let ends: Vec<NodeId> = [chain.vertices[0], chain.vertices[chain.vertices.len() - 1]]
         .iter()
         .map(|&v| node_of_vertex[v as usize])
         .filter(|&n| n != NONE)
         .map(NodeId)
         .collect();
     let closed = ends.is_empty() || (ends.len() == 2 && ends[0] == ends[1]);
-    let mut polyline: Vec<MedialPoint> = chain
-        .vertices
-        .iter()
-        .map(|&v| MedialPoint {
-            position: fine.vertex_position[v as usize],
-            radius: fine.vertex_radius[v as usize],
-        })
-        .collect();
-    if ends.is_empty() {
-        polyline.pop();
-    }
-    attributes::smooth(&mut polyline, ends.is_empty(), smoothing_mm);
     Curve {
         id: CurveId::from_index(index),
         kind: chain.kind,
         persistence,
+        length: attributes::length(&polyline, closed),
         nodes: ends,
         closed,
         sheets,
-        length: attributes::length(&polyline, closed),
         polyline,
     }
 }

@@ -3,8 +3,8 @@
 //! In: the fine scaffold and its regularisation. Out: [`CoarseScaffold`].
 //!
 //! * [`hypergraph`]: the types that matching, measures and reports read;
-//! * [`build`]: [`coarse_scaffold`], the front function; `network` finds nodes, curves and sheets, `attributes` measures
-//!   them, `generators` maps the surface to them, `natural` finds gaps in the persistences.
+//! * [`build`]: [`coarse_scaffold`], the front function; `network` finds nodes, curves and sheets, `ribs` fits the borders, `attributes`
+//!   measures, `generators` maps the surface to them, `natural` finds gaps in the persistences.
 
 mod attributes;
 pub mod build;
@@ -12,6 +12,7 @@ mod generators;
 pub mod hypergraph;
 mod natural;
 mod network;
+pub mod ribs;
 pub mod settings;
 
 pub use build::coarse_scaffold;

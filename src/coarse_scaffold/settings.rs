@@ -10,7 +10,7 @@ pub struct CoarseScaffoldSettings {
     pub contract_seam: f64,
     /// Axial curves up to this long between two nodes are shrunk to a node (transitions A1^5 and A1^2A3-I).
     pub contract_curve: f64,
-    /// Width over which curves are smoothed for display and length; their ends stay.
+    /// Standard deviation of the Gaussian that curves are smoothed with; their ends stay.
     pub smoothing: f64,
 }
 
@@ -19,7 +19,7 @@ impl Default for CoarseScaffoldSettings {
         Self {
             contract_seam: 2.5,
             contract_curve: 0.5,
-            smoothing: 2.0,
+            smoothing: 1.0,
         }
     }
 }
