@@ -80,7 +80,7 @@ fn a_torus_is_one_closed_wire() {
     assert_eq!((coarse.sheets.len(), coarse.nodes.len()), (0, 0));
     assert_eq!(count(&coarse, CurveKind::Wire), 1);
     let length = coarse.curves[0].length;
-    assert!((length / std::f64::consts::TAU - 1.0).abs() < 0.03, "{length}");
+    assert!((length / std::f64::consts::TAU - 1.0).abs() < 0.01, "{length}");
 }
 
 #[test]

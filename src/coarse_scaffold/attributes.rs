@@ -158,7 +158,12 @@ fn moments(mesh: &SheetMesh, centroid: DVec3, area: f64) -> SheetMoments {
             ..SheetMoments::default()
         };
     }
-    let eigen = SymmetricEigen::new(m / area);
+    principal(m / area, centroid)
+}
+
+/// Moments from the covariance about the centroid.
+pub(crate) fn principal(covariance: Matrix3<f64>, centroid: DVec3) -> SheetMoments {
+    let eigen = SymmetricEigen::new(covariance);
     let mut order = [0, 1, 2];
     order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
     let axis = |k: usize| {

@@ -96,13 +96,7 @@ pub fn coarse_scaffold(
     let mut nodes = nodes(fine, &node_vertices, &curves);
     seam_persistence(&mut curves, &nodes);
     for node in &mut nodes {
-        node.persistence = node
-            .curves
-            .iter()
-            .map(|c| &curves[c.index()])
-            .filter(|c| matches!(c.kind, CurveKind::Axial | CurveKind::Wire))
-            .map(|c| c.persistence)
-            .fold(0.0, f64::max);
+        node.persistence = node_persistence(&node.curves, &curves);
     }
     let mut sheets: Vec<Sheet> = sheet_facets
         .iter()
@@ -266,18 +260,7 @@ fn nodes(fine: &FineScaffold, node_vertices: &[Vec<u32>], curves: &[Curve]) -> V
                     r(a).total_cmp(&r(b)).then(b.cmp(&a))
                 })
                 .unwrap_or(0) as usize;
-            let number = |kind: CurveKind| at.iter().filter(|c| curves[c.index()].kind == kind).count();
-            let (axial, rib, wire) = (
-                number(CurveKind::Axial),
-                number(CurveKind::Rib),
-                number(CurveKind::Wire),
-            );
-            let kind = match (axial, rib, wire, at.len()) {
-                (4, 0, 0, 4) => NodeKind::A14,
-                (1, _, 0, _) if rib >= 1 => NodeKind::A1A3,
-                (0, 0, 1, 1) => NodeKind::Tip,
-                _ => NodeKind::Degenerate,
-            };
+            let kind = node_kind(&at, curves);
             Node {
                 id: NodeId::from_index(i),
                 kind,
@@ -288,4 +271,27 @@ fn nodes(fine: &FineScaffold, node_vertices: &[Vec<u32>], curves: &[Curve]) -> V
             }
         })
         .collect()
+}
+
+/// What meets at a node where the given curves end.
+pub(crate) fn node_kind(at: &[CurveId], curves: &[Curve]) -> NodeKind {
+    let number = |kind: CurveKind| at.iter().filter(|c| curves[c.index()].kind == kind).count();
+    let axial = number(CurveKind::Axial);
+    let rib = number(CurveKind::Rib);
+    let wire = number(CurveKind::Wire);
+    match (axial, rib, wire, at.len()) {
+        (4, 0, 0, 4) => NodeKind::A14,
+        (1, _, 0, _) if rib >= 1 => NodeKind::A1A3,
+        (0, 0, 1, 1) => NodeKind::Tip,
+        _ => NodeKind::Degenerate,
+    }
+}
+
+/// Largest persistence of the axial curves and wires among the given curves.
+pub(crate) fn node_persistence(at: &[CurveId], curves: &[Curve]) -> f64 {
+    at.iter()
+        .map(|c| &curves[c.index()])
+        .filter(|c| matches!(c.kind, CurveKind::Axial | CurveKind::Wire))
+        .map(|c| c.persistence)
+        .fold(0.0, f64::max)
 }

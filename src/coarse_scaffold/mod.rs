@@ -4,7 +4,8 @@
 //!
 //! * [`hypergraph`]: the types that matching, measures and reports read;
 //! * [`build`]: [`coarse_scaffold`], the front function; `network` finds nodes, curves and sheets, `ribs` fits the borders, `attributes`
-//!   measures, `generators` maps the surface to them, `natural` finds gaps in the persistences.
+//!   measures, `generators` maps the surface to them, `natural` finds gaps in the persistences;
+//! * [`view`]: the graph at a coarser tolerance.
 
 mod attributes;
 pub mod build;
@@ -14,6 +15,7 @@ mod natural;
 mod network;
 pub mod ribs;
 pub mod settings;
+pub mod view;
 
 pub use build::coarse_scaffold;
 pub use hypergraph::{

@@ -1,0 +1,255 @@
+//! The same scaffold at a coarser tolerance, from the persistences alone.
+//!
+//! In: a coarse scaffold. Out: the graph of what is at least as persistent as the tolerance: nothing is burnt or collapsed
+//! again, so views are cheap, and nested: what a coarse view shows, every finer one shows too.
+//!
+//! 1. sheets below the tolerance go; of a part of the scaffold that would vanish, the most persistent sheet stays;
+//! 2. axial curves, wires and seams below it go; sheets on both sides of a curve that went become one, and what a sheet
+//!    that went stood for (volume, generators) falls to the sheet it hung on;
+//! 3. nodes that no curve ends at go; where just two curves of one kind are left, they become one.
+//!
+//! Cost: `O(elements log elements)`.
+
+use super::attributes::{boundaries, principal};
+use super::build::{node_kind, node_persistence};
+use super::hypergraph::{CoarseScaffold, Curve, CurveKind, FineLinks, Node, Sheet};
+use super::natural::natural_tolerances;
+use crate::geometry::mesh::DisjointSets;
+use crate::geometry::{CurveId, NodeId, SheetId};
+use glam::DVec3;
+use nalgebra::{Matrix3, Vector3};
+
+impl CoarseScaffold {
+    /// The graph at a tolerance no finer than its own; see [the module](super::view). A finer tolerance returns it unchanged.
+    pub fn view(&self, tolerance_mm: f64) -> CoarseScaffold {
+        if tolerance_mm <= self.tolerance_mm {
+            return self.clone();
+        }
+        let keep_sheet = self.sheets_kept(tolerance_mm);
+        let keep_curve: Vec<bool> = self
+            .curves
+            .iter()
+            .map(|c| match c.kind {
+                CurveKind::Rib => c.sheets.iter().all(|s| keep_sheet[s.index()]),
+                _ => c.persistence >= tolerance_mm,
+            })
+            .collect();
+        let mut merged = DisjointSets::new(self.sheets.len());
+        for (c, _) in self.curves.iter().zip(&keep_curve).filter(|(_, k)| !**k) {
+            for pair in c.sheets.windows(2) {
+                merged.union(pair[0].0, pair[1].0);
+            }
+        }
+        let (mut sheets, sheet_of) = self.merged_sheets(&keep_sheet, &mut merged);
+        let mut curves: Vec<Curve> = self
+            .curves
+            .iter()
+            .zip(&keep_curve)
+            .filter(|(_, keep)| **keep)
+            .map(|(c, _)| Curve {
+                sheets: c
+                    .sheets
+                    .iter()
+                    .filter_map(|s| sheet_of[s.index()])
+                    .map(SheetId)
+                    .collect(),
+                ..c.clone()
+            })
+            .collect();
+        join_curves(&mut curves, self.nodes.len());
+        let nodes = renumber(&mut curves, &self.nodes, &self.curves, sheets.is_empty());
+        boundaries(&mut sheets, &curves);
+        CoarseScaffold {
+            tolerance_mm,
+            diagonal_mm: self.diagonal_mm,
+            natural_tolerances: natural_tolerances(&curves, tolerance_mm, self.diagonal_mm),
+            nodes,
+            curves,
+            sheets,
+            transforms: self.transforms.clone(),
+            fine: FineLinks::default(),
+        }
+    }
+
+    /// Sheets that stay: those persistent enough, and the most persistent one of each part without any.
+    fn sheets_kept(&self, tolerance_mm: f64) -> Vec<bool> {
+        let mut keep: Vec<bool> = self
+            .sheets
+            .iter()
+            .map(|s| s.persistence >= tolerance_mm)
+            .collect();
+        let mut parts = DisjointSets::new(self.sheets.len());
+        for c in &self.curves {
+            for pair in c.sheets.windows(2) {
+                parts.union(pair[0].0, pair[1].0);
+            }
+        }
+        let mut best: Vec<Option<u32>> = vec![None; self.sheets.len()];
+        for s in 0..self.sheets.len() as u32 {
+            let slot = &mut best[parts.find(s) as usize];
+            if slot.is_none_or(|b| self.sheets[b as usize].persistence < self.sheets[s as usize].persistence)
+            {
+                *slot = Some(s);
+            }
+        }
+        for s in best.into_iter().flatten() {
+            keep[s as usize] = true;
+        }
+        keep
+    }
+
+    /// One sheet for each merged set that holds a kept one, and the new number of every sheet that is still there.
+    fn merged_sheets(&self, keep: &[bool], merged: &mut DisjointSets) -> (Vec<Sheet>, Vec<Option<u32>>) {
+        let n = self.sheets.len();
+        let mut members: Vec<Vec<usize>> = vec![Vec::new(); n];
+        for s in 0..n {
+            members[merged.find(s as u32) as usize].push(s);
+        }
+        let mut sheets = Vec::new();
+        let mut number = vec![None; n];
+        for own in members {
+            let kept: Vec<&Sheet> = own
+                .iter()
+                .filter(|&&s| keep[s])
+                .map(|&s| &self.sheets[s])
+                .collect();
+            if kept.is_empty() {
+                continue;
+            }
+            for &s in own.iter().filter(|&&s| keep[s]) {
+                number[s] = Some(sheets.len() as u32);
+            }
+            let mut sheet = union_of(&kept);
+            sheet.id = SheetId::from_index(sheets.len());
+            sheet.volume_share = own.iter().map(|&s| self.sheets[s].volume_share).sum();
+            sheet.generators = own.iter().map(|&s| self.sheets[s].generators).sum();
+            sheets.push(sheet);
+        }
+        (sheets, number)
+    }
+}
+
+/// Several sheets as one: sums, weighted means and moments.
+fn union_of(sheets: &[&Sheet]) -> Sheet {
+    let mut out = sheets[0].clone();
+    if sheets.len() == 1 {
+        return out;
+    }
+    let area: f64 = sheets.iter().map(|s| s.area).sum();
+    let share = |s: &Sheet| {
+        if area > 0.0 {
+            s.area / area
+        } else {
+            1.0 / sheets.len() as f64
+        }
+    };
+    let centroid: DVec3 = sheets.iter().map(|s| share(s) * s.moments.centroid).sum();
+    let mut covariance = Matrix3::<f64>::zeros();
+    for s in sheets {
+        let d: Vector3<f64> = (s.moments.centroid - centroid).into();
+        covariance += d * d.transpose() * share(s);
+        for (axis, deviation) in s.moments.axes.iter().zip(s.moments.deviations) {
+            let a: Vector3<f64> = (*axis).into();
+            covariance += a * a.transpose() * (deviation * deviation * share(s));
+        }
+    }
+    out.area = area;
+    out.persistence = sheets.iter().map(|s| s.persistence).fold(0.0, f64::max);
+    out.mean_radius = sheets.iter().map(|s| share(s) * s.mean_radius).sum();
+    out.max_radius = sheets.iter().map(|s| s.max_radius).fold(0.0, f64::max);
+    out.moments = principal(covariance, centroid);
+    for s in &sheets[1..] {
+        let base = out.mesh.vertices.len() as u32;
+        out.mesh.vertices.extend(&s.mesh.vertices);
+        out.mesh
+            .triangles
+            .extend(s.mesh.triangles.iter().map(|t| t.map(|i| i + base)));
+    }
+    out
+}
+
+/// Joins curves of one kind at nodes where nothing else ends.
+fn join_curves(curves: &mut Vec<Curve>, nodes: usize) {
+    let mut at: Vec<Vec<usize>> = vec![Vec::new(); nodes];
+    for (i, c) in curves.iter().enumerate() {
+        for n in &c.nodes {
+            at[n.index()].push(i);
+        }
+    }
+    let mut gone = vec![false; curves.len()];
+    for n in 0..nodes {
+        let &[a, b] = at[n].as_slice() else { continue };
+        let node = NodeId::from_index(n);
+        if curves[a].kind != curves[b].kind {
+            continue;
+        }
+        if a == b {
+            // A loop through a node that nothing else ends at: a closed curve without nodes.
+            let c = &mut curves[a];
+            c.nodes.clear();
+            c.closed = true;
+            if c.polyline.len() > 1 {
+                c.polyline.pop();
+            }
+            continue;
+        }
+        let second = curves[b].clone();
+        let first = &mut curves[a];
+        if first.nodes[1] != node {
+            first.nodes.reverse();
+            first.polyline.reverse();
+        }
+        let mut tail = second.polyline;
+        let mut far = second.nodes.clone();
+        if far[0] != node {
+            far.reverse();
+            tail.reverse();
+        }
+        first.polyline.extend(tail.into_iter().skip(1));
+        first.nodes[1] = far[1];
+        first.closed = first.nodes[0] == first.nodes[1];
+        first.length += second.length;
+        first.persistence = first.persistence.max(second.persistence);
+        gone[b] = true;
+        // The far end now belongs to the joined curve.
+        for slot in &mut at[far[1].index()] {
+            if *slot == b {
+                *slot = a;
+            }
+        }
+    }
+    let mut keep = gone.iter().map(|g| !g);
+    curves.retain(|_| keep.next().unwrap_or(true));
+}
+
+/// Numbers curves and the nodes they end at afresh. Without any curve or sheet a lone node (a ball) stays.
+fn renumber(curves: &mut [Curve], nodes: &[Node], before: &[Curve], nothing_else: bool) -> Vec<Node> {
+    let mut ends: Vec<Vec<CurveId>> = vec![Vec::new(); nodes.len()];
+    for (i, c) in curves.iter_mut().enumerate() {
+        c.id = CurveId::from_index(i);
+        for n in &c.nodes {
+            ends[n.index()].push(c.id);
+        }
+    }
+    let lone = |n: &Node| nothing_else && before.is_empty() && n.curves.is_empty();
+    let mut number = vec![None; nodes.len()];
+    let mut out = Vec::new();
+    for (n, own) in nodes.iter().zip(ends) {
+        if own.is_empty() && !lone(n) {
+            continue;
+        }
+        let id = NodeId::from_index(out.len());
+        number[n.id.index()] = Some(id);
+        out.push(Node {
+            id,
+            kind: node_kind(&own, curves),
+            persistence: node_persistence(&own, curves),
+            curves: own,
+            ..n.clone()
+        });
+    }
+    for c in curves {
+        c.nodes = c.nodes.iter().filter_map(|n| number[n.index()]).collect();
+    }
+    out
+}
