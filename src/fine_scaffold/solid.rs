@@ -4,7 +4,7 @@
 //!
 //! The interior of the union of inside tetrahedra is an open 3-manifold; shrunk a little it is compact, and its boundary is
 //! the surface of the union *unpinched*: where the surface touches itself along an edge or in a vertex, the sides are told
-//! apart by walking through the solid. For a compact 3-manifold in space `b0` counts components, `b2` the
+//! apart by walking through the solid, and the tip that a vertex puts into the solid is drilled out. For a compact 3-manifold in space `b0` counts components, `b2` the
 //! boundary components less `b0`, and half the Euler number of the boundary is `b0 - b1 + b2` (Hatcher, Algebraic Topology,
 //! 3.3 and Alexander duality). Cost `O(tetrahedra)`.
 
@@ -57,23 +57,72 @@ pub fn solid_betti(triangulation: &Triangulation, segregation: &Segregation, sid
             }
         }
     }
-    let mut vertices = 0i64;
-    let mut components = 0i64;
-    for (i, &facet) in boundary.iter().enumerate() {
-        let i = i as u32;
-        components += i64::from(surfaces.find(i) == i);
-        for place in (0..4u32).filter(|&k| k != u32::from(facet.index)) {
-            vertices += i64::from(corners.find(4 * i + place) == 4 * i + place);
-        }
-    }
+    let patches = patches(triangulation, &of_side);
+    let euler_of_vertices = euler_of_vertices(triangulation, &boundary, &mut corners, patches, &mut surfaces);
+    let components = (0..boundary.len() as u32)
+        .filter(|&i| surfaces.find(i) == i)
+        .count() as i64;
     let triangles = boundary.len() as i64;
-    let euler = vertices - 3 * triangles / 2 + triangles;
+    let euler = euler_of_vertices - 3 * triangles / 2 + triangles;
     let b2 = components - b0;
     Betti {
         b0,
         b1: b0 + b2 - euler / 2,
         b2,
     }
+}
+
+/// The patches of every generator's link: corners `4 * tet + place` of tetrahedra of the side, joined across the
+/// triangles between them that hold the generator.
+fn patches(triangulation: &Triangulation, of_side: &impl Fn(crate::geometry::TetId) -> bool) -> DisjointSets {
+    let mut patches = DisjointSets::new(4 * triangulation.num_finite());
+    for tet in triangulation.finite_tets().filter(|&t| of_side(t)) {
+        for index in 0..4 {
+            let next = triangulation.neighbour(tet, index);
+            if next < tet || !of_side(next) {
+                continue;
+            }
+            let there = triangulation.tet(next);
+            for (place, v) in triangulation.tet(tet).iter().enumerate().filter(|p| p.0 != index) {
+                if let Some(k) = there.iter().position(|w| w == v) {
+                    patches.union(4 * tet.0 + place as u32, 4 * next.0 + k as u32);
+                }
+            }
+        }
+    }
+    patches
+}
+
+/// What the generators add to the Euler number of the boundary. Near a generator the solid is a cone over a patch of the
+/// generator's link, without the tip; shrunk, its boundary there is a copy of the patch, a sphere with as many holes as
+/// the patch has border loops. So a patch with `k` loops adds `2 - k` (an ordinary vertex: 1), and joins the surfaces of its
+/// loops.
+fn euler_of_vertices(
+    triangulation: &Triangulation,
+    boundary: &[Facet],
+    corners: &mut DisjointSets,
+    mut patches: DisjointSets,
+    surfaces: &mut DisjointSets,
+) -> i64 {
+    let mut first_of_patch = vec![NONE; 4 * triangulation.num_finite()];
+    let mut euler = 0;
+    for (i, &facet) in boundary.iter().enumerate() {
+        let i = i as u32;
+        for place in (0..4u32).filter(|&k| k != u32::from(facet.index)) {
+            if corners.find(4 * i + place) != 4 * i + place {
+                continue;
+            }
+            let first = &mut first_of_patch[patches.find(4 * facet.tet.0 + place) as usize];
+            if *first == NONE {
+                *first = i;
+                euler += 1;
+            } else {
+                surfaces.union(*first, i);
+                euler -= 1;
+            }
+        }
+    }
+    euler
 }
 
 /// The boundary facet met when turning from `facet` through the solid about its edge that misses corner `opposite`.

@@ -1,0 +1,5 @@
+//! Shared by the examples: the way from points on a known surface to a scaffold, and a small z-buffer that draws it.
+#![allow(dead_code)]
+
+pub mod picture;
+pub mod run;
