@@ -207,6 +207,8 @@ fn both_directions_say_the_same() {
             .linear
             .abs_diff_eq(DMat3::IDENTITY, 1e-9)
     );
+    assert!(ab.edit.lower_bound <= ab.edit.upper_bound + 1e-12);
+    assert!(ab.edit.exact, "seven elements are few enough for a proof");
     let sum: f64 = ab.edit.operations.iter().map(|o| o.price()).sum();
     assert!((sum - ab.edit.upper_bound).abs() < 1e-9 * (1.0 + sum));
 }

@@ -4,7 +4,8 @@
 //!    of (A, B) is exactly the mirror of that of (B, A).
 //! 2. Graduated assignment on attributes alone; its pairs give a guess of the pose by consistency and robust fit.
 //! 3. That guess and those of the moments compete in the alignment of medial points ([`super::dense`]).
-//! 4. Graduated assignment again, with places under the pose: now the pairs are the correspondences.
+//! 4. Graduated assignment again, with places under the pose, improved and bounded by branch and bound: now the pairs are the
+//!    correspondences.
 //! 5. The map becomes an edit path; the medial residual, with and without size, and the path's price the shape distance.
 
 use super::compatibility::{Placement, costs};
@@ -19,6 +20,7 @@ use super::settings::MatchingSettings;
 use crate::coarse_scaffold::hypergraph::CoarseScaffold;
 use crate::geometry::{CurveId, NodeId, Rigid, SheetId};
 use glam::{DMat3, DVec3};
+use matchers::edit_distance::branch_and_bound;
 use matchers::graduated_assignment::{HypergraphMatch, MatchSettings, match_hypergraphs};
 use matchers::pose::{RobustPoseSettings, robust_pose};
 use matchers::{ElementCosts, EvidenceSettings, MatchingProblem};
@@ -142,6 +144,10 @@ struct OrderedPair {
 struct Assigned {
     matched: HypergraphMatch,
     costs: ElementCosts,
+    /// No map is cheaper than this, mm.
+    lower_bound: f64,
+    /// The map is proven to be the cheapest.
+    exact: bool,
 }
 
 impl OrderedPair {
@@ -266,7 +272,7 @@ impl OrderedPair {
         Some(super::dense::to_rigid(&found.pose))
     }
 
-    /// Graduated assignment; `None` when one side has nothing above the cut.
+    /// Graduated assignment; under a pose its map is then improved and bounded by branch and bound.
     fn assign(&self, placement: Option<Placement>, settings: &MatchingSettings) -> Option<Assigned> {
         let costs = costs(&self.first, &self.second, placement, settings);
         let problem = MatchingProblem::new(
@@ -277,9 +283,22 @@ impl OrderedPair {
         );
         // The tables were made for these graphs, and costs are at least 0 or infinite.
         let problem = problem.ok()?;
+        let start = MatchSettings::default();
+        let mut matched = match_hypergraphs(&problem, &[], &start);
+        let (mut lower_bound, mut exact) = (0.0, false);
+        if placement.is_some() {
+            let proof = branch_and_bound::search(&problem, &matched.map, settings.search_nodes);
+            if proof.upper_bound < matched.price {
+                matched = match_hypergraphs(&problem, &[proof.map], &start);
+            }
+            lower_bound = proof.lower_bound.min(matched.price);
+            exact = proof.exact;
+        }
         Some(Assigned {
-            matched: match_hypergraphs(&problem, &[], &MatchSettings::default()),
+            matched,
             costs,
+            lower_bound,
+            exact,
         })
     }
 
@@ -467,9 +486,9 @@ impl OrderedPair {
             steps.push(EditOperation::Rewire { price: rest });
         }
         Edit {
-            lower_bound: 0.0,
+            lower_bound: a.lower_bound,
             upper_bound: a.matched.price,
-            exact: a.matched.price == 0.0,
+            exact: a.exact,
             operations: steps,
         }
     }

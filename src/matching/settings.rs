@@ -17,6 +17,8 @@ pub struct MatchingSettings {
     pub unlike: f64,
     /// Share of the price of a pair that is its attributes, the rest is its place under the pose; 0 to 1.
     pub attribute_share: f64,
+    /// Most nodes of the search that proves the edit path the cheapest; beyond it the bounds stay apart.
+    pub search_nodes: usize,
     /// Poses kept, at least 2.
     pub hypotheses: usize,
     /// A pose is ambiguous when another, over 15 degrees away, has a residual below this multiple of its own; at least 1.
@@ -33,6 +35,7 @@ impl Default for MatchingSettings {
             reach: 0.06,
             unlike: 0.5,
             attribute_share: 0.3,
+            search_nodes: 2000,
             hypotheses: 6,
             rival_residual: 1.3,
             seed: 0,
