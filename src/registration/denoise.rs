@@ -15,6 +15,7 @@
 //! plane's normal.
 
 use super::cells::Cells;
+use super::shape::{RegistrationError, RegistrationShape};
 use glam::{DMat3, DVec3};
 use nalgebra::{Matrix3, SMatrix, SVector};
 use ordered_float::OrderedFloat;
@@ -28,6 +29,38 @@ pub(crate) struct Denoised {
     pub(crate) normals: Vec<DVec3>,
     /// Standard deviation of the noise, in the unit of the points.
     pub(crate) noise: f64,
+}
+
+/// A raw cloud made clean: what the registration of raw clouds works on.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CleanCloud {
+    /// The points on the smooth surface, in the order given, mm.
+    pub points: Vec<DVec3>,
+    /// Outward unit normals.
+    pub normals: Vec<DVec3>,
+    /// Standard deviation of the noise that was found, mm.
+    pub noise_mm: f64,
+}
+
+/// Removes the noise of a raw cloud and gives it outward normals; see the module for how.
+///
+/// # Errors
+/// [`RegistrationError`] when there are fewer than four points, or they are not finite or all in one place.
+///
+/// # Complexity
+/// `O(n k)` with `k` the points in a ball of a few spacings.
+pub fn clean_cloud(points: &[DVec3]) -> Result<CleanCloud, RegistrationError> {
+    RegistrationShape::cloud(points).validate("cloud")?;
+    let unit = super::oriented::diagonal(points);
+    let centre = points.iter().copied().sum::<DVec3>() / points.len() as f64;
+    let local: Vec<DVec3> = points.iter().map(|&p| (p - centre) / unit).collect();
+    let all: Vec<u32> = (0..points.len() as u32).collect();
+    let clean = denoise(&local, &all);
+    Ok(CleanCloud {
+        points: clean.points.iter().map(|&p| p * unit + centre).collect(),
+        normals: clean.normals,
+        noise_mm: clean.noise * unit,
+    })
 }
 
 /// A quadratic height field over a plane, fitted around a place.

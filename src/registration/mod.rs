@@ -37,6 +37,7 @@ mod solve;
 mod surface;
 mod verdict;
 
+pub use denoise::{CleanCloud, clean_cloud};
 pub use difference::{Difference, SheetContext, SheetDifference, difference};
 pub use result::{Conditioning, Hypothesis, Method, Registration, SlidingDirection};
 pub use settings::{Extent, Mirror, RegistrationSettings};
