@@ -41,6 +41,7 @@ fn mask(name: &str, shift: f64, label: impl Fn(DVec3) -> i32) -> Shape {
             units: "mm".to_owned(),
         },
         warnings: Vec::new(),
+        notes: Vec::new(),
     }
 }
 

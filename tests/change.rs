@@ -54,6 +54,7 @@ fn shape(name: &str, geometry: Geometry) -> Shape {
             units: "mm".to_owned(),
         },
         warnings: Vec::new(),
+        notes: Vec::new(),
     }
 }
 

@@ -157,6 +157,7 @@ pub fn check(shape: &Shape) -> CheckReport {
     let mut problems: Vec<Problem> = shape
         .warnings
         .iter()
+        .chain(&shape.notes)
         .map(|w| problem(Severity::Note, w.clone(), ""))
         .collect();
     let (content, corners) = match &shape.geometry {

@@ -84,6 +84,8 @@ pub(crate) struct Parsed {
     pub(crate) frame: Option<Stated<Frame>>,
     pub(crate) units: Option<Stated<Units>>,
     pub(crate) warnings: Vec<String>,
+    /// What is worth knowing, but nothing to worry about.
+    pub(crate) notes: Vec<String>,
 }
 
 /// The three kinds of content.

@@ -339,6 +339,7 @@ fn settle(path: &Path, bytes: &[u8], parsed: Parsed, settings: &ReadSettings) ->
             units: settled.units,
         },
         warnings,
+        notes: parsed.notes,
     })
 }
 

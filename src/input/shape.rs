@@ -16,6 +16,8 @@ pub struct Shape {
     pub provenance: Provenance,
     /// What a user should know about the file, in plain words.
     pub warnings: Vec<String>,
+    /// What was done that is no reason to worry.
+    pub notes: Vec<String>,
 }
 
 impl Shape {
@@ -32,6 +34,7 @@ impl Shape {
                 units: "mm".to_owned(),
             },
             warnings: Vec::new(),
+            notes: Vec::new(),
         }
     }
 }

@@ -98,7 +98,7 @@ pub(super) fn run(
 ) -> Result<ScaffoldRun, StageError> {
     let mut stages = Stages::new(observer, prefix);
     let mut warnings = shape.warnings.clone();
-    let mut notes = Vec::new();
+    let mut notes = shape.notes.clone();
     let sided = side_of_surface(shape, settings, &mut stages, &mut notes, &mut warnings)?;
     let full = stages.run("full scaffold", || full_scaffold(&sided.triangulation))?;
     let fine_settings = FineScaffoldSettings { side: settings.side };

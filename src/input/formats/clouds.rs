@@ -228,6 +228,7 @@ impl Rows {
             frame,
             units: None,
             warnings,
+            notes: Vec::new(),
         })
     }
 }

@@ -108,6 +108,7 @@ pub(in crate::input) fn read(bytes: &[u8]) -> Result<Parsed, Flaw> {
         ));
     }
     Ok(Parsed {
+        notes: Vec::new(),
         format: SourceFormat::Gifti,
         content: Content::Surface(surface),
         frame: Some(Stated {

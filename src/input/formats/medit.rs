@@ -70,6 +70,7 @@ pub(in crate::input) fn read(bytes: &[u8]) -> Result<Parsed, Flaw> {
         frame: None,
         units: None,
         warnings,
+        notes: Vec::new(),
     })
 }
 

@@ -89,6 +89,7 @@ pub(in crate::input) fn read(bytes: &[u8], path: &Path, max_voxels: u64) -> Resu
         }),
         units: None,
         warnings: Vec::new(),
+        notes: Vec::new(),
     })
 }
 

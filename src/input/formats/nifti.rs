@@ -55,6 +55,7 @@ pub(in crate::input) fn read(bytes: &[u8], max_voxels: u64) -> Result<Parsed, Fl
     let mut warnings = Vec::new();
     let affine = header.affine(&mut warnings)?;
     Ok(Parsed {
+        notes: Vec::new(),
         format: SourceFormat::Nifti,
         content: Content::Volume(Volume {
             dims,

@@ -56,6 +56,7 @@ pub(in crate::input) fn read(bytes: &[u8], path: &Path, max_voxels: u64) -> Resu
         frame,
         units: fields.units(),
         warnings,
+        notes: Vec::new(),
     })
 }
 

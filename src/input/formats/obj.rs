@@ -89,6 +89,7 @@ pub(in crate::input) fn read(bytes: &[u8]) -> Result<Parsed, Flaw> {
         surface.normals.clear();
     }
     Ok(Parsed {
+        notes: Vec::new(),
         format: SourceFormat::Obj,
         content: Content::Surface(surface),
         frame,

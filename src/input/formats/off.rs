@@ -99,6 +99,7 @@ pub(in crate::input) fn read(bytes: &[u8]) -> Result<Parsed, Flaw> {
         frame: lines.frame,
         units: None,
         warnings: Vec::new(),
+        notes: Vec::new(),
     })
 }
 

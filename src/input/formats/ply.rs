@@ -79,6 +79,7 @@ pub(in crate::input) fn read(bytes: &[u8]) -> Result<Parsed, Flaw> {
         frame,
         units: None,
         warnings: Vec::new(),
+        notes: Vec::new(),
     })
 }
 

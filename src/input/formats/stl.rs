@@ -40,7 +40,7 @@ pub(in crate::input) fn read(bytes: &[u8]) -> Result<Parsed, Flaw> {
         space_comment(&bytes[..HEADER])
     };
     let corners = 3 * welder.surface.triangles.len();
-    let warnings = vec![format!(
+    let notes = vec![format!(
         "STL stores loose triangles: {corners} corners with equal coordinates were joined to {} points",
         welder.surface.points.len()
     )];
@@ -49,7 +49,8 @@ pub(in crate::input) fn read(bytes: &[u8]) -> Result<Parsed, Flaw> {
         content: Content::Surface(welder.surface),
         frame,
         units: None,
-        warnings,
+        warnings: Vec::new(),
+        notes,
     })
 }
 

@@ -42,6 +42,7 @@ pub(in crate::input) fn read(bytes: &[u8]) -> Result<Parsed, Flaw> {
         frame: space_comment(title),
         units: None,
         warnings: Vec::new(),
+        notes: Vec::new(),
     })
 }
 

@@ -84,6 +84,7 @@ pub(in crate::input) fn read(bytes: &[u8]) -> Result<Parsed, Flaw> {
         frame: file.frame,
         units: None,
         warnings: Vec::new(),
+        notes: Vec::new(),
     })
 }
 
