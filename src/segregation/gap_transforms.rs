@@ -37,15 +37,15 @@ use std::collections::BinaryHeap;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CostRule {
-    /// Half the local spacing, and edges of at most four local spacings.
+    /// Half the local spacing, and edges of at most five local spacings.
     #[default]
     Local,
     /// The authors': the median of half the length of all Delaunay edges, and edges of at most six times that.
     Authors,
 }
 
-/// Longest edge over the local spacing: the length from which an edge counts as unsupported.
-const LOCAL_REACH: f64 = 4.0;
+/// Longest edge over the local spacing.
+const LOCAL_REACH: f64 = 5.0;
 /// Longest edge over the median half edge, authors' rule.
 const AUTHORS_REACH: f64 = 6.0;
 /// Times a triangle may be undone.
