@@ -16,6 +16,7 @@ use super::planar::{self, PlanarScaffold};
 use super::spheres::{TetGeometry, tet_geometry};
 use crate::delaunay::door::Frame;
 use crate::delaunay::{DelaunayError, Facet, Triangulation};
+use crate::geometry::fixed::Grid;
 use crate::geometry::predicates::edge_gabriel_perturbed;
 use crate::geometry::{Sphere, TetId};
 use glam::DVec3;
@@ -225,10 +226,11 @@ pub fn full_scaffold(t: &Triangulation) -> Result<FullScaffold, DelaunayError> {
     if t.dimension < 3 {
         return planar::flat_scaffold(t, &points);
     }
+    let grid = Grid::new(points.iter().fold(0.0, |m, p| p.abs().max_element().max(m)));
     let (spheres, signs): (Vec<Sphere>, Vec<u8>) = (0..t.num_finite() as u32)
         .into_par_iter()
         .map(|i| {
-            let g: TetGeometry = tet_geometry(t, &points, TetId(i));
+            let g: TetGeometry = tet_geometry(t, &points, grid, TetId(i));
             let sphere = Sphere {
                 centre: g.sphere.centre.to_array().map(|v| frame.restore(v)).into(),
                 radius: frame.restore(g.sphere.radius),

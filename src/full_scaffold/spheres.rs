@@ -11,6 +11,7 @@
 use crate::delaunay::{Facet, INFINITE, Triangulation};
 use crate::geometry::TetId;
 use crate::geometry::circumsphere::{self, Sphere};
+use crate::geometry::fixed::Grid;
 use crate::geometry::predicates::{EPSILON, UNDERFLOW, insphere, tri_gabriel_perturbed};
 use glam::DVec3;
 
@@ -29,8 +30,9 @@ pub(super) struct TetGeometry {
 /// of the differences, of the lengths in the bound and of the bound itself.
 const ERROR: f64 = 48.0 * EPSILON;
 
-/// Geometry of a finite tetrahedron; `points` are those of the triangulation in the frame of the predicates.
-pub(super) fn tet_geometry(t: &Triangulation, points: &[DVec3], tet: TetId) -> TetGeometry {
+/// Geometry of a finite tetrahedron; `points` are those of the triangulation in the frame of the predicates,
+/// `grid` is theirs.
+pub(super) fn tet_geometry(t: &Triangulation, points: &[DVec3], grid: Grid, tet: TetId) -> TetGeometry {
     let ids = t.tet(tet);
     let corners = ids.map(|v| points[v.index()]);
     let a = corners[0];
@@ -72,12 +74,15 @@ pub(super) fn tet_geometry(t: &Triangulation, points: &[DVec3], tet: TetId) -> T
             let power = q.dot(m) - qq * det;
             if power.abs() <= ERROR * (qq.sqrt() * reach + qq * volume) + UNDERFLOW {
                 let [a, b, c, d] = corners;
-                cospherical |= u8::from(insphere(a, b, c, d, p) == 0.0) << k;
+                let side = grid
+                    .insphere(a, b, c, d, p)
+                    .unwrap_or_else(|| insphere(a, b, c, d, p));
+                cospherical |= u8::from(side == 0.0) << k;
             }
         }
     }
     TetGeometry {
-        sphere: circumsphere::tetrahedron(corners),
+        sphere: circumsphere::tetrahedron_from(corners, m, det, volume, lu + lv + lw),
         outside,
         cospherical,
     }

@@ -32,20 +32,26 @@ const WELL_CONDITIONED: f64 = 1.0 / 16384.0;
 pub fn tetrahedron(corners: [DVec3; 4]) -> Sphere {
     let a = corners[0];
     let [u, v, w] = [corners[1] - a, corners[2] - a, corners[3] - a];
+    let (uu, vv, ww) = (u.length_squared(), v.length_squared(), w.length_squared());
     let vw = v.cross(w);
-    let det = u.dot(vw);
-    let m = u.length_squared() * vw + v.length_squared() * w.cross(u) + w.length_squared() * u.cross(v);
-    let [lu, lv, lw] = [u.length(), v.length(), w.length()];
-    let volume = lu * lv * lw;
-    let well = det.abs() > WELL_CONDITIONED * volume
-        && m.length_squared() > (WELL_CONDITIONED * volume * (lu + lv + lw)).powi(2);
+    let m = uu * vw + vv * w.cross(u) + ww * u.cross(v);
+    let [lu, lv, lw] = [uu.sqrt(), vv.sqrt(), ww.sqrt()];
+    tetrahedron_from(corners, m, u.dot(vw), lu * lv * lw, lu + lv + lw)
+}
+
+/// [`tetrahedron`] with the numerator `m`, the determinant, the product and the sum of the lengths of the three edges from the
+/// first corner at hand.
+#[inline]
+pub(crate) fn tetrahedron_from(corners: [DVec3; 4], m: DVec3, det: f64, volume: f64, lengths: f64) -> Sphere {
+    let least = WELL_CONDITIONED * volume;
+    let well = det.abs() > least && m.length_squared() > (least * lengths).powi(2);
     let offset = if well {
-        m / (2.0 * det)
+        m * (0.5 / det)
     } else {
         tetrahedron_exact(corners)
     };
     Sphere {
-        centre: a + offset,
+        centre: corners[0] + offset,
         radius: offset.length(),
     }
 }

@@ -17,7 +17,7 @@
 //! Exact while no product over- or underflows: coordinates of magnitude `2^-178` to `2^168` with differences that are
 //! multiples of `2^-178` are safe; [`crate::delaunay::door::Frame`] brings any cloud there by a power of two.
 
-use super::expansion::Vector;
+use super::expansion::{Vector, two_sum};
 use glam::DVec3;
 use robust::Coord3D;
 use std::cmp::Ordering;
@@ -127,7 +127,7 @@ pub fn edge_gabriel(a: DVec3, b: DVec3, d: DVec3) -> f64 {
     let dot = u.dot(v);
     // Two rounded differences, one product and at most two sums a term: (1 + e)^5 - 1 < 6e, and 8e covers the bound itself.
     let bound = 8.0 * EPSILON * u.abs().dot(v.abs()) + UNDERFLOW;
-    if dot.abs() > bound {
+    if dot.abs() > bound || exact_on_lattice(&[(a, d, u), (b, d, v)], 24) {
         return dot;
     }
     Vector::difference(a, d).dot(&Vector::difference(b, d)).sign()
@@ -175,11 +175,32 @@ pub fn tri_gabriel(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> f64 {
     let an = cross_magnitude(au, av);
     let am = vv * cross_magnitude(an, au) + uu * cross_magnitude(av, an);
     let bound = 32.0 * EPSILON * (ww * an.length_squared() + aw.dot(am)) + UNDERFLOW;
-    if g.abs() > bound {
+    if g.abs() > bound || exact_on_lattice(&[(b, a, u), (c, a, v), (d, a, w)], 7) {
         g
     } else {
         tri_gabriel_exact(a, b, c, d)
     }
+}
+
+/// Whether the differences `d = p - q` are exact and are multiples of one unit, at most `2^bits` of it: a polynomial of degree
+/// `n` and with few terms is then exact in plain arithmetic as long as `n * bits` stays well below 53. The case of lattices.
+#[inline(never)]
+fn exact_on_lattice(differences: &[(DVec3, DVec3, DVec3)], bits: i32) -> bool {
+    let largest = differences
+        .iter()
+        .fold(0.0f64, |m, (_, _, d)| m.max(d.abs().max_element()));
+    let exponent = ((largest.to_bits() >> 52) & 0x7ff) as i32 - 1022;
+    if !(-150..=161).contains(&exponent) {
+        return false;
+    }
+    let units = f64::powi(2.0, bits - exponent);
+    differences.iter().all(|&(p, q, d)| {
+        let exact = |p: f64, q: f64| two_sum(p, -q)[0] == 0.0;
+        exact(p.x, q.x) && exact(p.y, q.y) && exact(p.z, q.z) && {
+            let whole = d * units;
+            whole == whole.trunc()
+        }
+    })
 }
 
 /// The cross product with every minus a plus: bounds the magnitudes of its terms.
@@ -225,8 +246,14 @@ fn tri_gabriel_tie(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> f64 {
         // Barycentric coordinate of the foot of d at corner i: with u from the next corner to corner i, v to the third and
         // w to d it is ((w.u)(v.v) - (w.v)(u.v)) / |u x v|^2.
         let base = corners[(i + 1) % 3];
-        let [u, v, w] = [corners[i], corners[(i + 2) % 3], d].map(|p| Vector::difference(p, base));
-        let weight = w.dot(&u).mul(&v.dot(&v)).sub(&w.dot(&v).mul(&u.dot(&v))).sign();
+        let (p, q) = (corners[i], corners[(i + 2) % 3]);
+        let (u, v, w) = (p - base, q - base, d - base);
+        let weight = if exact_on_lattice(&[(p, base, u), (q, base, v), (d, base, w)], 11) {
+            w.dot(u) * v.dot(v) - w.dot(v) * u.dot(v)
+        } else {
+            let [u, v, w] = [p, q, d].map(|p| Vector::difference(p, base));
+            w.dot(&u).mul(&v.dot(&v)).sub(&w.dot(&v).mul(&u.dot(&v))).sign()
+        };
         if weight != 0.0 {
             return -weight;
         }
