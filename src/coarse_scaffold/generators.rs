@@ -44,15 +44,11 @@ pub(crate) fn generator_hosts(
         .filter(|&v| regularised.alive.vertices[v as usize])
         .collect();
     let tree = BallTree::new(alive, &fine.vertex_position, &fine.vertex_radius);
-    let mut takes_part = vec![false; n];
-    for g in fine.edge_generators.iter().flatten() {
-        takes_part[g.index()] = true;
-    }
     hosts
         .into_par_iter()
         .enumerate()
         .map(|(g, host)| {
-            if host != Host::Absent || !takes_part[g] {
+            if host != Host::Absent {
                 return host;
             }
             tree.nearest(fine.generator_position[g], None, |_| true)

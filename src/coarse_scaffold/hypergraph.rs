@@ -75,7 +75,7 @@ pub enum Host {
     Curve(CurveId),
     /// A node that is all there is (a ball).
     Node(NodeId),
-    /// No tetrahedron of this side has the generator: it takes no part.
+    /// Nothing: the scaffold is empty.
     Absent,
 }
 
