@@ -118,7 +118,10 @@ await open(['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-
       const v = window.medialViewer;
       const count = () => v.layers.filter((l) => l.kind === 'sheet' && l.object.visible).length;
       const at = (t) => { v.tolerance = t; v.apply(); return count(); };
-      const p = v.layers.filter((l) => l.kind === 'sheet').map((l) => l.persistence).sort((a, b) => a - b);
+      // Sheets that are switched off (the source's, at first) are no matter of the tolerance.
+      at(0);
+      const shown = v.layers.filter((l) => l.kind === 'sheet' && l.object.visible);
+      const p = shown.map((l) => l.persistence).sort((a, b) => a - b);
       const out = [at(p[0]), at(p[p.length - 1]), p.length];
       at(v.settings.tolerance_mm ?? 0);
       return out;
