@@ -51,6 +51,8 @@ pub struct ShapeDistance {
     /// share of the size.
     pub without_size: f64,
     /// Price of making one hypergraph from the other, mm of evidence: unmatched elements, changed incidences, deformations.
+    /// Continuous for a given pose; the pose of two unequal scaffolds settles to within a degree, which moves it by some
+    /// percent.
     pub structure_mm: f64,
     /// `structure_mm` as a share of the price of having nothing in common, 0 to 1.
     pub structure: f64,
