@@ -9,7 +9,9 @@
 //!    of a face decide alike, so the surface closes.
 //! 2. The segments of a cube form rings; the rings are cut into triangles. A cut between two points of one face is not allowed
 //!    unless it is a segment: the cube beyond could make the same cut and four triangles would meet there, the one way in which
-//!    the classic tables give edges that are not manifold. Where no cut is left the ring gets a point in its middle.
+//!    the classic tables give edges that are not manifold. Of the cuts allowed that is taken which encloses most, or least
+//!    where more than half of the corners are inside: so neither convex nor hollow places are favoured, and the volumes are
+//!    those of PyRadiomics' tables. Where no cut is left the ring gets a point in its middle.
 //! 3. Rings are made for the 256 cases once, from rule 1, not copied from a table.
 //!
 //! Lorensen & Cline 1987; Duerst 1988 on the ambiguous faces. We keep our own because the crates give soups in `f32`
@@ -306,7 +308,14 @@ fn share_face(a: u8, b: u8) -> bool {
 /// The rings of all 256 cases; bit `c` of a case is set when corner `c` is inside.
 fn cases() -> Vec<Vec<Ring>> {
     (0..256usize)
-        .map(|case| rings(case).into_iter().map(Ring::cut).collect())
+        .map(|case| {
+            // With four inside the complement has four too, and the choice is free.
+            let sign = if case.count_ones() <= 4 { 1.0 } else { -1.0 };
+            rings(case)
+                .into_iter()
+                .map(|ring| Ring::cut(ring, sign))
+                .collect()
+        })
         .collect()
 }
 
@@ -345,9 +354,9 @@ fn rings(case: usize) -> Vec<Vec<u8>> {
 }
 
 impl Ring {
-    fn cut(edges: Vec<u8>) -> Self {
+    fn cut(edges: Vec<u8>, sign: f64) -> Self {
         let n = edges.len() as u8;
-        match best_cut(&edges, 0, n - 1) {
+        match best_cut(&edges, sign, 0, n - 1) {
             Some(cut) => Self {
                 edges,
                 triangles: cut.triangles,
@@ -369,9 +378,9 @@ struct Cut {
     volume: f64,
 }
 
-/// Of all allowed ways to cut the part of a ring between positions `a` and `b` the one that encloses most; `None` when there
-/// is none.
-fn best_cut(ring: &[u8], a: u8, b: u8) -> Option<Cut> {
+/// Of all allowed ways to cut the part of a ring between positions `a` and `b` the one that encloses most (`sign` 1) or least
+/// (`sign` -1); `None` when there is none.
+fn best_cut(ring: &[u8], sign: f64, a: u8, b: u8) -> Option<Cut> {
     if b - a < 2 {
         return Some(Cut::default());
     }
@@ -385,12 +394,12 @@ fn best_cut(ring: &[u8], a: u8, b: u8) -> Option<Cut> {
         if !(allowed(a, m) && allowed(m, b)) {
             continue;
         }
-        let (Some(mut cut), Some(other)) = (best_cut(ring, a, m), best_cut(ring, m, b)) else {
+        let (Some(mut cut), Some(other)) = (best_cut(ring, sign, a, m), best_cut(ring, sign, m, b)) else {
             continue;
         };
         cut.triangles.extend(other.triangles);
         cut.triangles.push([a, m, b]);
-        cut.volume += other.volume + at(a).dot(at(m).cross(at(b))) / 6.0;
+        cut.volume += other.volume + sign * at(a).dot(at(m).cross(at(b))) / 6.0;
         if best.as_ref().is_none_or(|known| cut.volume > known.volume) {
             best = Some(cut);
         }

@@ -41,8 +41,9 @@ pub struct SamplingSettings {
     pub feature_angle_deg: f64,
     /// Label of a label map; `None` takes all labels as one solid.
     pub label: Option<i32>,
-    /// Smoothing passes on the surface of a label map; 0 keeps the voxel stairs. On voxelised balls of 16 to 64 voxels 20 passes
-    /// halve the stairs (0.20 to 0.09 voxels rms) and nearly keep the volume; more passes make it grow.
+    /// Smoothing passes on the surface of a label map; 0 keeps the voxel stairs. On voxelised balls of 16, 32 and 64 voxels 20
+    /// passes halve the stairs (0.20 to 0.10 voxels rms) and take the mean volume from -0.79, -0.17 and -0.03 % of the truth
+    /// to +0.05, +0.07 and +0.03 %; more passes make it grow.
     pub smoothing_passes: u32,
     /// Seed of the sampling.
     pub seed: u64,
