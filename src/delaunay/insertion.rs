@@ -335,9 +335,15 @@ impl<'a> Inserter<'a> {
         }
         self.last = self.star[0];
         if S::SHARED {
-            for (b, &tet) in self.boundary[..self.facets].iter().zip(&self.star) {
+            // Each once: a tetrahedron outside that has several facets on the cavity, let go of a second time, would be
+            // taken from under whoever holds it by then. Slots of the cavity are no longer noted as outside.
+            for &tet in &self.tested[..self.visited] {
+                if store.is_outside(tet) {
+                    store.release(tet);
+                }
+            }
+            for &tet in &self.star {
                 store.release(tet);
-                store.release(b.outside >> 2);
             }
         }
     }

@@ -136,6 +136,11 @@ impl Store for Worker<'_> {
     }
 
     #[inline(always)]
+    fn is_outside(&self, tet: u32) -> bool {
+        self.shared.owners[tet as usize].load(Relaxed) == self.tag | OUTSIDE
+    }
+
+    #[inline(always)]
     fn reserve(&mut self, needed: usize) -> bool {
         while self.free.len() + self.fresh.len() < needed {
             let start = self.shared.next.fetch_add(SLOTS, Relaxed);

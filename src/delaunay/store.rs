@@ -30,6 +30,8 @@ pub(super) trait Store {
     fn note(&mut self, tet: u32, inside: bool);
     /// Whether a visited tetrahedron is in conflict.
     fn is_inside(&self, tet: u32) -> bool;
+    /// Whether a taken tetrahedron was visited and is not in conflict.
+    fn is_outside(&self, tet: u32) -> bool;
     /// Makes sure that `needed` slots can be had from [`Self::slot`]; `false` when there is no room.
     fn reserve(&mut self, needed: usize) -> bool;
     /// A slot for a new tetrahedron, taken.
@@ -149,6 +151,11 @@ impl Store for Plain {
     #[inline(always)]
     fn is_inside(&self, tet: u32) -> bool {
         self.stamps[tet as usize] == 2 * self.insertion + 1
+    }
+
+    #[inline(always)]
+    fn is_outside(&self, tet: u32) -> bool {
+        self.stamps[tet as usize] == 2 * self.insertion
     }
 
     #[inline(always)]

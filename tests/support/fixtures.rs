@@ -221,6 +221,14 @@ pub fn shuffled(points: &[DVec3], seed: u64) -> Vec<DVec3> {
     out
 }
 
+/// `n` uniform points of a cube.
+pub fn random_cube(n: usize, seed: u64) -> Vec<DVec3> {
+    let mut rng = rng(seed);
+    (0..n)
+        .map(|_| DVec3::from_array(std::array::from_fn(|_| rng.random_range(-1.0..1.0))))
+        .collect()
+}
+
 /// Sets large enough for several threads to work on.
 pub fn larger() -> Vec<(String, Vec<DVec3>)> {
     let mut rng = rng(77);
