@@ -522,3 +522,102 @@ fn mesh_volumes_agree_with_the_published_ones() {
         );
     }
 }
+
+/// What other readers of the same formats make of the real files, in the file's own frame.
+#[test]
+fn other_readers_read_the_same() {
+    use nifti::NiftiObject;
+    let Some(root) = data() else { return };
+    let mut files = Vec::new();
+    walk(&root, &mut files);
+    let mut compared = std::collections::BTreeMap::<String, usize>::new();
+    for path in &files {
+        let extension = path.extension().unwrap_or_default().to_string_lossy().to_string();
+        let ours = || {
+            read_shape(path, &ReadSettings::default())
+                .unwrap_or_else(|e| panic!("{e}"))
+                .geometry
+        };
+        let file = || std::io::BufReader::new(std::fs::File::open(path).expect("readable"));
+        match extension.as_str() {
+            "stl" => {
+                let Geometry::Mesh(mesh) = ours() else {
+                    panic!("a mesh")
+                };
+                let theirs = stl_io::read_stl(&mut file()).expect("an STL file");
+                assert_eq!(mesh.triangles.len(), theirs.faces.len());
+                assert_eq!(mesh.points.len(), theirs.vertices.len());
+                for (t, f) in mesh.triangles.iter().zip(&theirs.faces) {
+                    let corners = f.vertices.map(|v| theirs.vertices[v].0.map(f64::from));
+                    assert_eq!(
+                        t.map(|v| mesh.points[v as usize].to_array()),
+                        corners,
+                        "{}",
+                        path.display()
+                    );
+                }
+            }
+            "obj" => {
+                let Geometry::Mesh(mesh) = ours() else {
+                    panic!("a mesh")
+                };
+                let options = tobj::LoadOptions {
+                    triangulate: true,
+                    ..Default::default()
+                };
+                let (models, _) = tobj::load_obj(path, &options).expect("an OBJ file");
+                let triangles: usize = models.iter().map(|m| m.mesh.indices.len() / 3).sum();
+                assert_eq!(mesh.triangles.len(), triangles, "{}", path.display());
+                let [m] = models.as_slice() else { continue };
+                for (t, f) in mesh.triangles.iter().zip(m.mesh.indices.chunks_exact(3)) {
+                    for (v, w) in t.iter().zip(f) {
+                        let at = 3 * *w as usize;
+                        assert_eq!(mesh.points[*v as usize].to_array(), m.mesh.positions[at..at + 3]);
+                    }
+                }
+            }
+            "ply" => {
+                let points = match ours() {
+                    Geometry::Mesh(m) => m.points,
+                    Geometry::Cloud(c) => c.points,
+                    Geometry::Labels(_) => panic!("points"),
+                };
+                let parser = ply_rs_bw::parser::Parser::<ply_rs_bw::ply::DefaultElement>::new();
+                let theirs = parser.read_ply(&mut file()).expect("a PLY file");
+                let vertices = &theirs.payload["vertex"];
+                assert_eq!(points.len(), vertices.len());
+                for (p, v) in points.iter().zip(vertices) {
+                    let get = |k: &str| match v[k] {
+                        ply_rs_bw::ply::Property::Float(x) => f64::from(x),
+                        ply_rs_bw::ply::Property::Double(x) => x,
+                        _ => panic!("a real number"),
+                    };
+                    assert_eq!(p.to_array(), ["x", "y", "z"].map(get));
+                }
+            }
+            "gz" if path.to_string_lossy().contains(".nii") => {
+                let Geometry::Labels(map) = ours() else {
+                    panic!("labels")
+                };
+                let theirs = nifti::ReaderOptions::new().read_file(path).expect("a NIfTI file");
+                assert_eq!(
+                    theirs.header().dim[1..4]
+                        .iter()
+                        .map(|&d| usize::from(d))
+                        .collect::<Vec<_>>(),
+                    map.dims
+                );
+                let volume = nifti::IntoNdArray::into_ndarray::<f64>(theirs.into_volume()).expect("voxels");
+                // ndarray counts the last axis fastest; ours is the first.
+                for (index, &v) in volume.indexed_iter() {
+                    let i = index[0] + map.dims[0] * (index[1] + map.dims[1] * index[2]);
+                    assert_eq!(f64::from(map.values[i]), v, "{}", path.display());
+                }
+            }
+            _ => continue,
+        }
+        *compared.entry(extension).or_default() += 1;
+    }
+    println!("compared: {compared:?}");
+    assert_eq!(compared.values().sum::<usize>(), 51 + 31 + 5 + 39);
+}
