@@ -56,10 +56,11 @@ fn threads_do_not_matter() {
 }
 
 /// More threads than processors are interrupted in the middle of an insertion. A tetrahedron let go of twice was then lost to
-/// another thread, in one cloud of twenty-five with eight threads.
+/// another thread, in one cloud of twenty to sixty with eight threads on two processors. It is a matter of chance, hence so
+/// many clouds.
 #[test]
 fn interrupted_threads_do_not_lose_what_they_hold() {
-    for seed in 0..60 {
+    for seed in 0..200 {
         let points = fixtures::random_cube(10_000, seed);
         let one = delaunay(&points, &DelaunaySettings { threads: 1 }).expect("finite points");
         let many = delaunay(&points, &DelaunaySettings { threads: 8 }).expect("finite points");
