@@ -23,7 +23,8 @@ class Viewer {
     this.shown = new Map(); // "kind|shape" -> boolean
     this.sheetColours = 'component';
     this.clarity = 0.3;
-    this.renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: false });
+    // The drawing is kept so that print, screenshots of the page and "save picture" never find an empty canvas.
+    this.renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
     this.renderer.localClippingEnabled = true;
     this.scene = new THREE.Scene();
