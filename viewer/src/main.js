@@ -413,11 +413,15 @@ class Viewer {
   resize() {
     const { clientWidth: w, clientHeight: h } = this.host;
     if (!w || !h) return;
+    const size = this.renderer.getSize(new THREE.Vector2());
+    if (size.x === w && size.y === h) return;
     this.renderer.setSize(w, h, false);
     const framed = this.camera.aspect;
     this.camera.aspect = w / h;
     this.camera.updateProjectionMatrix();
-    if (this.layers.length && Math.abs(framed - w / h) > 0.2) this.home(); else this.draw();
+    if (this.layers.length && Math.abs(framed - w / h) > 0.2) this.home();
+    // A canvas of a new size is empty: drawn at once, or it would flicker, and stay empty in a screenshot.
+    this.render();
   }
 
   draw() {
