@@ -151,3 +151,51 @@ fn scaffold_writes_what_the_contract_names_and_the_same_bytes_on_any_number_of_t
     }
     assert!(seen[0] == seen[1], "threads change the output");
 }
+
+/// A mask of thick slices does not know its surface better than half a slice: the tolerance is at least that unless one is asked for,
+/// and the result says so.
+#[test]
+fn the_tolerance_of_a_mask_is_at_least_half_its_largest_voxel_edge() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let mask = dir.path().join("ball.nrrd");
+    let (across, slices) = (24usize, 9usize);
+    let mut bytes = format!(
+        "NRRD0004\ntype: uint8\ndimension: 3\nsizes: {across} {across} {slices}\nspace: left-posterior-superior\n\
+         space directions: (1,0,0) (0,1,0) (0,0,3)\nspace origin: (0,0,0)\nendian: little\nencoding: raw\n\n"
+    )
+    .into_bytes();
+    for k in 0..slices {
+        for j in 0..across {
+            for i in 0..across {
+                let d = [i as f64 - 11.5, j as f64 - 11.5, 3.0 * (k as f64 - 4.0)];
+                bytes.push(u8::from(d.iter().map(|x| x * x).sum::<f64>() < 100.0));
+            }
+        }
+    }
+    fs::write(&mask, bytes).expect("the mask is written");
+    let run = |extra: &[&str]| -> serde_json::Value {
+        let out_dir = dir.path().join("out");
+        let mut args = vec![
+            "scaffold",
+            mask.to_str().expect("a text path"),
+            "-o",
+            out_dir.to_str().expect("a text path"),
+            "--json",
+            "--no-report",
+        ];
+        args.extend(extra);
+        let out = medial(&args);
+        assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+        serde_json::from_slice(&out.stdout).expect("JSON on stdout")
+    };
+    let floored = run(&[]);
+    assert_eq!(floored["tolerance_mm"], 1.5);
+    assert!(
+        floored["notes"].to_string().contains("largest voxel edge"),
+        "{}",
+        floored["notes"]
+    );
+    let asked = run(&["--tolerance", "0.4mm"]);
+    assert_eq!(asked["tolerance_mm"], 0.4);
+    assert!(!asked["notes"].to_string().contains("largest voxel edge"));
+}

@@ -68,15 +68,10 @@ pub struct Common {
     #[arg(long, value_name = "LEN", global = true, help_heading = "Method")]
     pub spacing: Option<Length>,
 
-    /// How much the shape may change when its scaffold is simplified: 0.5mm, 1%diag, 1.5x-spacing, 0.3radius.
-    #[arg(
-        long,
-        value_name = "LEN",
-        default_value = "1%diag",
-        global = true,
-        help_heading = "Method"
-    )]
-    pub tolerance: Length,
+    /// How much the shape may change when its scaffold is simplified: 0.5mm, 1%diag, 1.5x-spacing, 0.3radius [default: 1%diag; of a
+    /// mask at least half its largest voxel edge].
+    #[arg(long, value_name = "LEN", global = true, help_heading = "Method")]
+    pub tolerance: Option<Length>,
 
     /// Side of the surface the scaffold is taken of.
     #[arg(
@@ -174,7 +169,10 @@ impl Common {
             side,
             ..ScaffoldSettings::default()
         };
-        settings.regularise.tolerance = self.tolerance;
+        match self.tolerance {
+            Some(tolerance) => settings.regularise.tolerance = tolerance,
+            None => settings.least_tolerance_vox = 0.5,
+        }
         settings.sampling.seed = self.seed;
         settings.sampling.label = self.label;
         settings.cloud.seed = self.seed;

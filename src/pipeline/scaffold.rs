@@ -14,9 +14,9 @@ use crate::coarse_scaffold::{CoarseScaffold, CoarseScaffoldSettings, coarse_scaf
 use crate::delaunay::Triangulation;
 use crate::fine_scaffold::{FineScaffold, FineScaffoldSettings, Side, fine_scaffold, solid_betti};
 use crate::full_scaffold::{CriticalCounts, full_scaffold};
-use crate::geometry::TriangleMesh;
-use crate::input::Shape;
+use crate::geometry::{Length, TriangleMesh};
 use crate::input::sampling::{SamplingSettings, sample};
+use crate::input::{Geometry, Shape};
 use crate::regularise::{RegulariseSettings, Regularised, regularise};
 use crate::segregation::{
     CloudReport, KnownSurfaceSettings, Segregation, SegregationSettings, segregate_cloud,
@@ -38,6 +38,9 @@ pub struct ScaffoldSettings {
     pub side: Side,
     /// Regularisation, with the tolerance.
     pub regularise: RegulariseSettings,
+    /// Least tolerance for a mask, in its largest voxel edges; 0 for none. A mask does not know its surface better than half a voxel,
+    /// and what a smaller tolerance keeps is the steps between its slices.
+    pub least_tolerance_vox: f64,
     /// Coarse scaffold.
     pub coarse: CoarseScaffoldSettings,
 }
@@ -105,7 +108,11 @@ pub(super) fn run(
     let fine = stages.run("fine scaffold", || {
         fine_scaffold(&sided.triangulation, &sided.segregation, &fine_settings)
     })?;
-    let regularised = stages.run("regularise", || regularise(&fine, &settings.regularise))?;
+    let regularise_settings = RegulariseSettings {
+        tolerance: tolerance_of_mask(shape, settings, &fine, &mut notes),
+        ..settings.regularise.clone()
+    };
+    let regularised = stages.run("regularise", || regularise(&fine, &regularise_settings))?;
     let coarse = stages.run("coarse scaffold", || {
         coarse_scaffold(&fine, &regularised, &settings.coarse)
     });
@@ -131,6 +138,30 @@ pub(super) fn run(
         notes,
         warnings,
     })
+}
+
+/// The tolerance asked for, or for a mask the least that its voxels allow when that is more.
+fn tolerance_of_mask(
+    shape: &Shape,
+    settings: &ScaffoldSettings,
+    fine: &FineScaffold,
+    notes: &mut Vec<String>,
+) -> Length {
+    let asked = settings.regularise.tolerance;
+    let Geometry::Labels(map) = &shape.geometry else {
+        return asked;
+    };
+    let voxel_mm = map.spacing_mm.max_element();
+    let least_mm = settings.least_tolerance_vox * voxel_mm;
+    if matches!(asked, Length::LocalRadii(_)) || asked.to_mm(fine.scale, 0.0) >= least_mm {
+        return asked;
+    }
+    notes.push(format!(
+        "the tolerance is {least_mm:.3} mm, {} of the largest voxel edge of {voxel_mm:.3} mm: a mask does not know its surface \
+         better; --tolerance {asked} keeps more",
+        settings.least_tolerance_vox
+    ));
+    Length::Millimetres(least_mm)
 }
 
 /// Generators triangulated and labelled.
