@@ -461,7 +461,7 @@ fn real_masks_give_closed_surfaces() {
         let Geometry::Labels(map) = &shape.geometry else {
             continue;
         };
-        for passes in [0, 20] {
+        for passes in [0, 60] {
             let settings = LabelSurfaceSettings {
                 label: None,
                 smoothing_passes: passes,

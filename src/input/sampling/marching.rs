@@ -508,7 +508,7 @@ mod tests {
         assert!(map.direction.determinant() < 0.0);
         let settings = LabelSurfaceSettings {
             label: Some(1),
-            smoothing_passes: 20,
+            smoothing_passes: 60,
         };
         let surface = label_surface(&map, &settings).expect("voxels");
         let t = surface.mesh.topology();
@@ -532,5 +532,48 @@ mod tests {
             .err(),
             Some(SamplingError::NoLabel { label: 3 })
         );
+    }
+
+    /// Balls at eight offsets from the grid: smoothing takes stairs off and keeps the volume.
+    #[test]
+    fn smoothing_takes_the_stairs_off_balls_and_keeps_their_volume() {
+        for (diameter, slice_vox, stairs, volume) in [
+            (16, 1.0, 0.08, 0.002),
+            (32, 1.0, 0.07, 0.002),
+            (32, 3.0, 0.27, 0.003),
+        ] {
+            let radius = 0.5 * f64::from(diameter);
+            let (mut square, mut points, mut ratio) = (0.0, 0, 0.0);
+            for corner in 0..8 {
+                let offset = |axis: u32| if corner >> axis & 1 == 1 { 0.37 } else { 0.11 };
+                let n = diameter as usize + 4;
+                let centre = DVec3::new(offset(0), offset(1), offset(2)) + 0.5 * n as f64;
+                let map = {
+                    let mut m = map([n, n, (n as f64 / slice_vox) as usize + 1], |i, j, k| {
+                        DVec3::new(i as f64, j as f64, slice_vox * k as f64).distance(centre) <= radius
+                    });
+                    m.spacing_mm.z = slice_vox;
+                    m
+                };
+                let settings = LabelSurfaceSettings {
+                    label: Some(1),
+                    smoothing_passes: 60,
+                };
+                let surface = label_surface(&map, &settings).expect("voxels");
+                for p in &surface.mesh.points {
+                    square +=
+                        (p.distance(map.position(centre / DVec3::new(1.0, 1.0, slice_vox))) - radius).powi(2);
+                    points += 1;
+                }
+                let truth = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
+                ratio += surface.volume_mm3 / truth / 8.0;
+            }
+            let rms = (square / f64::from(points)).sqrt();
+            println!(
+                "{diameter} voxels, slices of {slice_vox}: stairs {rms:.3} voxels rms, volume {:+.2} %",
+                100.0 * (ratio - 1.0)
+            );
+            assert!(rms < stairs && (ratio - 1.0).abs() < volume, "{rms} {ratio}");
+        }
     }
 }

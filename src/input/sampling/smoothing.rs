@@ -11,9 +11,10 @@ use crate::geometry::TriangleMesh;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Taubin's factors; the pass band `1/lambda + 1/mu` is 0.1, as he recommends.
+/// Taubin's factors. The pass band `1/lambda + 1/mu` is 0.04: where slices are thick the surface is a staircase of plateaus several
+/// voxels wide, which the 0.1 he recommends lets through. A pass band of 0.02 shrinks balls of 16 voxels by 0.5 %.
 const LAMBDA: f64 = 0.5;
-const MU: f64 = -0.526_315_789_473_684_2;
+const MU: f64 = -0.510_204_081_632_653_1;
 
 /// How far a point may move along each axis, voxels.
 pub const HALF_VOXEL: f64 = 0.5;
