@@ -82,6 +82,18 @@ pub fn boundary_sd_mm(region: &Region, settings: &ChangeSettings) -> f64 {
     })
 }
 
+/// Standard deviation of the boundary's position along a normal, mm: a voxel's extent in that direction over the square root of 12
+/// (thick slices leave flat ends in doubt by a slice), or the boundary's own when that is larger.
+pub fn boundary_sd_along_mm(region: &Region, settings: &ChangeSettings, normal: DVec3) -> f64 {
+    match &region.mask {
+        Some(mask) => {
+            let extent = (mask.direction.inverse() * normal * mask.spacing_mm).length();
+            (extent / 12f64.sqrt()).max(settings.boundary_sd_mm.unwrap_or(0.0))
+        }
+        None => boundary_sd_mm(region, settings),
+    }
+}
+
 fn mean_edge_mm(region: &Region) -> f64 {
     let mesh = &region.surface;
     let sum: f64 = mesh

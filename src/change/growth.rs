@@ -9,7 +9,9 @@
 //! 2. each triangle sweeps a prism, cut into three tetrahedra along diagonals that neighbours share; the signed prisms add up
 //!    exactly to the difference in volume between the displaced and the old surface, which is the integral of
 //!    `h + H h^2 + K h^3 / 3` over the surface. Its difference from the change measured directly is the identity residual;
-//! 3. patches: connected sets of triangles whose vertices all moved the same way by more than the threshold.
+//! 3. patches: connected sets of triangles whose vertices all moved the same way by more than half their threshold, at least one of
+//!    them by more than the whole (two levels, as edges are traced: what is sure spreads over what is likely). The threshold follows
+//!    the voxel's extent along the normal, so that flat ends between thick slices do not pass for growth.
 
 use crate::coarse_scaffold::hypergraph::CoarseScaffold;
 use crate::geometry::closest::SignedDistance;
@@ -220,19 +222,21 @@ impl GrowthMap {
         }
     }
 
-    /// Patches that moved by more than `threshold_mm`, the largest first; those with less than a hundredth of the volume swept
-    /// in all patches are left out.
-    pub fn patches(&self, threshold_mm: f64, centroid: DVec3) -> Vec<Part> {
+    /// Patches that moved by more than the threshold of their vertices, the largest first; those with less than a hundredth of the
+    /// volume swept in all patches are left out.
+    pub fn patches(&self, thresholds_mm: &[f64], centroid: DVec3) -> Vec<Part> {
         let total: f64 = self.swept_mm3.iter().sum();
         let area: f64 = self.mesh.area();
         let mut parts = Vec::new();
         for way in [1.0, -1.0] {
-            let moved = |t: &[u32; 3]| {
-                t.iter()
-                    .all(|i| way * self.displacement_mm[*i as usize] > threshold_mm)
+            let moved = |t: usize, share: f64| {
+                self.mesh.triangles[t]
+                    .map(|i| i as usize)
+                    .iter()
+                    .all(|i| way * self.displacement_mm[*i] > share * thresholds_mm[*i])
             };
             let ids: Vec<usize> = (0..self.mesh.triangles.len())
-                .filter(|t| moved(&self.mesh.triangles[*t]))
+                .filter(|t| moved(*t, 0.5))
                 .collect();
             let changed = TriangleMesh {
                 points: self.mesh.points.clone(),
@@ -240,6 +244,9 @@ impl GrowthMap {
             };
             for patch in changed.components() {
                 let triangles: Vec<usize> = patch.iter().map(|t| ids[*t as usize]).collect();
+                if !triangles.iter().any(|t| moved(*t, 1.0)) {
+                    continue;
+                }
                 let mut part = self.part(PartKind::Patch, &triangles, total);
                 let verb = if way > 0.0 { "grew" } else { "shrank" };
                 let place = direction_name(part.centre - centroid, part.area_mm2 / area);

@@ -169,9 +169,8 @@ fn lesion_change(
     );
     let map = growth::growth_map(&b.surface, &f.surface);
     let direct = f.surface.signed_volume() - b.surface.signed_volume();
-    let sd = error_model::boundary_sd_mm(&b, settings).hypot(error_model::boundary_sd_mm(&f, settings));
     let parts = map.as_ref().map_or_else(Vec::new, |m| {
-        m.patches(settings.patch_threshold_sd * sd, baseline.centroid)
+        m.patches(&patch_thresholds_mm(m, &b, &f, settings), baseline.centroid)
     });
     let mut warnings = Vec::new();
     for (date, region) in [("baseline", &b), ("follow-up", &f)] {
@@ -207,6 +206,18 @@ fn lesion_change(
         growth_map: map.unwrap_or_default(),
         followup_surface: f.surface,
     }
+}
+
+/// By how much each vertex of a growth map must move to count as changed, mm.
+fn patch_thresholds_mm(map: &GrowthMap, b: &Region, f: &Region, settings: &ChangeSettings) -> Vec<f64> {
+    let of_mesh = |r: &Region| r.mask.is_none().then(|| error_model::boundary_sd_mm(r, settings));
+    let (fixed_b, fixed_f) = (of_mesh(b), of_mesh(f));
+    let sd = |r: &Region, fixed: Option<f64>, n: DVec3| {
+        fixed.unwrap_or_else(|| error_model::boundary_sd_along_mm(r, settings, n))
+    };
+    let normals = map.mesh.vertex_normals();
+    let of = |n: DVec3| settings.patch_threshold_sd * sd(b, fixed_b, n).hypot(sd(f, fixed_f, n));
+    normals.into_iter().map(of).collect()
 }
 
 /// Refuses shapes whose boxes lie farther apart than either is large: they are not in one frame.

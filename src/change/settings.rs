@@ -29,10 +29,12 @@ pub struct ChangeSettings {
     pub repeat_cv: Option<f64>,
     /// Tolerance of the surface Dice coefficient, mm. 1 mm is the smallest of those used for organs by Nikolov et al. 2018.
     pub surface_dice_tolerance_mm: f64,
-    /// Standard deviation of the smoothing kernel that turns a mask into a smooth surface, voxels along each axis. At 0.9 steps
-    /// of one voxel nearly vanish and structures of three voxels stay.
+    /// Standard deviation of the smoothing kernel that turns a mask into a smooth surface, voxels along each axis. At 1.2
+    /// the steps of slices vanish but for flat ends, and structures of three voxels stay.
     pub smoothing_vox: f64,
-    /// A patch of the surface counts as changed when it moved by more than this many boundary standard deviations.
+    /// A patch of the surface counts as changed when it somewhere moved by more than this many standard deviations of the
+    /// difference of two boundaries; it reaches as far as half of that. Each boundary is known to a voxel along its normal, so two
+    /// cannot differ by more than the square root of 6 without a change.
     pub patch_threshold_sd: f64,
     /// Components of fewer voxels are not lesions (pairing by overlap only); 0 keeps all.
     pub least_voxels: usize,
@@ -46,8 +48,8 @@ impl Default for ChangeSettings {
             boundary_sd_mm: None,
             repeat_cv: None,
             surface_dice_tolerance_mm: 1.0,
-            smoothing_vox: 0.9,
-            patch_threshold_sd: 2.0,
+            smoothing_vox: 1.2,
+            patch_threshold_sd: 2.45,
             least_voxels: 0,
         }
     }
