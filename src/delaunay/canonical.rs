@@ -32,26 +32,22 @@ const EVEN: [[u8; 4]; 12] = [
 /// In place of a rotation: the slot holds no tetrahedron.
 const DEAD: u8 = u8::MAX;
 
-/// Builds the canonical triangulation. `order[i]` is the lexicographic index of insertion vertex `i`; `free` lists slots
-/// that hold no tetrahedron.
+/// Builds the canonical triangulation. `order[i]` is the lexicographic index of insertion vertex `i`; slots
+/// without a tetrahedron hold the infinite vertex only.
 pub(super) fn canonical(
     points: Vec<DVec3>,
     order: &[u32],
     mut vertices: Vec<[u32; 4]>,
     neighbours: Vec<[u32; 4]>,
-    free: &[u32],
 ) -> Triangulation {
-    for &f in free {
-        vertices[f as usize] = [INF; 4];
-    }
     // Step 1, counting the buckets: bucket v holds finite tetrahedra, bucket n + v ghosts.
     let n = points.len();
     let mut ends = vec![0u32; 2 * n + 1];
-    let mut rotations: Vec<u8> = vertices
+    let rotations: Vec<u8> = vertices
         .iter_mut()
         .map(|v| {
             if v[0] == INF {
-                return 0;
+                return DEAD;
             }
             let rename = |i: u32| if i == INF { INF } else { order[i as usize] };
             let renamed = [rename(v[0]), rename(v[1]), rename(v[2]), rename(v[3])];
@@ -101,7 +97,6 @@ pub(super) fn canonical(
 
     // Step 3.
     // The old vertices are done with; their room serves the new neighbours.
-    free.iter().for_each(|&f| rotations[f as usize] = DEAD);
     let mut out = vertices;
     for (old, across) in neighbours
         .iter()

@@ -16,6 +16,7 @@
 //! `1.1548 abcd (a + b + c + d)`, and at most `4.62 L^(5/2)` with `L` the largest lift. The factors below exceed the products
 //! of these constants by more than the rounding of lengths and bounds.
 
+use super::lanes::{Corners, Lanes, Site};
 use crate::geometry::fixed::Grid;
 use crate::geometry::predicates::{self, EPSILON};
 use glam::DVec3;
@@ -72,14 +73,14 @@ impl Filter {
     /// Positive when `p` lies inside the sphere of the positively oriented tetrahedron `a, b, c, d`, ties broken by
     /// coordinates: never zero for distinct points.
     #[inline(always)]
-    pub(super) fn insphere(&self, tet: [DVec3; 4], p: DVec3) -> f64 {
-        let (det, lift) = insphere_value(tet[0] - p, tet[1] - p, tet[2] - p, tet[3] - p);
+    pub(super) fn insphere<L: Lanes>(&self, lanes: L, tet: Corners, p: &Site) -> f64 {
+        let (det, lift) = lanes.insphere(tet, p);
         let square = lift * lift;
         // An overflow makes the bound infinite, which is not certain.
         if det * det > INSPHERE_SQUARED * (square * square * lift) {
             det
         } else {
-            self.insphere_near(tet, p, det)
+            self.insphere_near(tet.map(Site::point), p.point(), det)
         }
     }
 
@@ -112,30 +113,19 @@ fn orient_bound(e: DVec3) -> f64 {
     ORIENT * e.x * e.y * e.z
 }
 
-/// The in-sphere determinant of four points relative to the fifth, in Shewchuk's order of operations (stage A), and the
-/// largest lift.
-#[inline(always)]
-fn insphere_value(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> (f64, f64) {
-    let ab = a.x * b.y - b.x * a.y;
-    let bc = b.x * c.y - c.x * b.y;
-    let cd = c.x * d.y - d.x * c.y;
-    let da = d.x * a.y - a.x * d.y;
-    let ac = a.x * c.y - c.x * a.y;
-    let bd = b.x * d.y - d.x * b.y;
-    let abc = a.z * bc - b.z * ac + c.z * ab;
-    let bcd = b.z * cd - c.z * bd + d.z * bc;
-    let cda = c.z * da + d.z * ac + a.z * cd;
-    let dab = d.z * ab + a.z * bd + b.z * da;
-    let lift = |p: DVec3| p.x * p.x + p.y * p.y + p.z * p.z;
-    let larger = |a: f64, b: f64| if a > b { a } else { b };
-    let (la, lb, lc, ld) = (lift(a), lift(b), lift(c), lift(d));
-    let det = (la * bcd - lb * cda) + (lc * dab - ld * abc);
-    (det, larger(larger(la, lb), larger(lc, ld)))
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::lanes::{Scalar, Task, with_lanes};
     use super::*;
+
+    struct Inside<'a>(&'a Filter, Corners<'a>, &'a Site);
+    impl Task for Inside<'_> {
+        type Output = bool;
+        #[inline(always)]
+        fn run<L: Lanes>(self, lanes: L) -> bool {
+            self.0.insphere(lanes, self.1, self.2) > 0.0
+        }
+    }
 
     /// Every step against expansions, on points from general to flat and cospherical.
     #[test]
@@ -164,7 +154,10 @@ mod tests {
                 continue;
             }
             let exact = predicates::insphere_perturbed(a, b, c, d, p) > 0.0;
-            assert_eq!(filter.insphere([a, b, c, d], p) > 0.0, exact, "{q:?}");
+            let [a, b, c, d, p] = q.map(|p| Site::new(p, 7.0));
+            let corners = [&a, &b, &c, &d];
+            assert_eq!(filter.insphere(Scalar, corners, &p) > 0.0, exact, "{q:?}");
+            assert_eq!(with_lanes(Inside(&filter, corners, &p)), exact, "{q:?}");
         }
     }
 }

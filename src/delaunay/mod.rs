@@ -5,15 +5,18 @@
 //! thread count can be seen in the result.
 //!
 //! Steps, one file each: [`door`] checks, sorts and merges the points; `order` arranges them in randomised rounds along a
-//! Hilbert curve; `insertion` adds them one by one; `canonical` renumbers. Points that do not span space are no error:
+//! Hilbert curve; `insertion` and `star` add them one by one into a `store`, with `parallel` by several threads, by the exact
+//! tests of `filter`, whose arithmetic is in `lanes`; `canonical` renumbers. Points that do not span space are no error:
 //! [`Triangulation::dimension`] says so and there are no tetrahedra.
 
 mod canonical;
 pub mod door;
 mod filter;
 mod insertion;
+mod lanes;
 mod order;
 mod parallel;
+mod star;
 mod store;
 pub mod triangulation;
 
@@ -24,7 +27,8 @@ use crate::geometry::predicates::{collinear, orient3d};
 use door::Frame;
 use filter::Filter;
 use glam::DVec3;
-use insertion::Inserter;
+use insertion::{Inserter, Memory};
+use lanes::{Lanes, Site, Task, with_lanes};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use store::Plain;
@@ -66,9 +70,14 @@ pub fn delaunay(points: &[DVec3], settings: &DelaunaySettings) -> Result<Triangu
         points.iter().map(|&p| frame.apply(p)).collect()
     };
     let order = order::insertion_order(&normalised, bounds);
-    let inserted: Vec<DVec3> = order.indices.iter().map(|&i| normalised[i as usize]).collect();
+    let sites: Vec<Site> = order
+        .indices
+        .iter()
+        .zip(&order.positions)
+        .map(|(&i, &position)| Site::new(normalised[i as usize], position))
+        .collect();
     drop(normalised);
-    let first = match first_simplex(&inserted) {
+    let first = match first_simplex(&sites) {
         Simplex::Tetrahedron(first) => first,
         Simplex::Flat(dimension) => {
             return Ok(Triangulation {
@@ -82,59 +91,82 @@ pub fn delaunay(points: &[DVec3], settings: &DelaunaySettings) -> Result<Triangu
         0 => rayon::current_num_threads(),
         n => n,
     };
-    let store = insert_all(&inserted, Filter::new(bounds), &order.ends, first, threads);
-    drop(inserted);
+    let store = insert_all(&sites, Filter::new(bounds), &order.ends, first, threads);
+    drop(sites);
     Ok(canonical::canonical(
         points,
         &order.indices,
         store.vertices,
         store.neighbours,
-        &store.free,
     ))
 }
 
 /// Points that one thread inserts before others join: until then they would be in each other's way.
-const ALONE: u32 = 1024;
+const ALONE: u32 = 8192;
 
 /// Slots a point: surfaces and uniform clouds need less than seven, torus-like ones a little more. More is not wrong, the
 /// store grows; it is untouched memory.
 const SLOTS_A_POINT: usize = 7;
 
 /// Inserts all points, whose rounds end at `ends`, beginning with the tetrahedron `first`.
-fn insert_all(points: &[DVec3], filter: Filter, ends: &[u32], first: [u32; 4], threads: usize) -> Plain {
-    let n = points.len() as u32;
-    let mut store = Plain::with_capacity(SLOTS_A_POINT * points.len() + 64);
+fn insert_all(sites: &[Site], filter: Filter, ends: &[u32], first: [u32; 4], threads: usize) -> Plain {
+    let n = sites.len() as u32;
+    let mut store = Plain::with_capacity(SLOTS_A_POINT * sites.len() + 64);
     insertion::first_tetrahedron(&mut store, first);
-    let mut last = 0;
-    let mut alone = |store: &mut Plain, vertices: &mut dyn Iterator<Item = u32>| {
-        let mut inserter = Inserter::new(points, filter, last);
-        for v in vertices.filter(|v| !first.contains(v)) {
-            let done = inserter.insert(store, v);
-            debug_assert!(done, "nothing is in the way of one thread");
-        }
-        last = inserter.last();
+    let alone = |store: &mut Plain, vertices: &mut dyn Iterator<Item = u32>| {
+        with_lanes(Alone {
+            memory: &mut Memory::new(sites.len(), store.any().expect("a tetrahedron was made")),
+            store,
+            sites,
+            filter,
+            vertices,
+        });
     };
-    if threads == 1 || n < 4 * ALONE {
-        alone(&mut store, &mut (0..n));
+    let mut others = |v: &u32| !first.contains(v);
+    if threads == 1 || n < 2 * ALONE {
+        alone(&mut store, &mut (0..n).filter(&mut others));
         return store;
     }
     // The four points of the first tetrahedron are among the first unless the cloud is nearly flat.
     let begin = first.into_iter().max().map_or(0, |v| v + 1).max(ALONE);
-    alone(&mut store, &mut (0..begin));
+    alone(&mut store, &mut (0..begin).filter(&mut others));
     let mut from = begin;
     let mut rounds = Vec::new();
     for &end in ends.iter().filter(|&&end| end > begin) {
         rounds.push(from..end);
         from = end;
     }
-    let room = (SLOTS_A_POINT * points.len() + 64).max(store.vertices.len()) + 2048 * threads;
-    let (mut store, given_up) = parallel::insert_rounds(store, points, filter, &rounds, threads, room);
-    last = store.used().next().expect("tetrahedra were inserted");
-    let mut inserter = Inserter::new(points, filter, last);
-    for v in given_up {
-        inserter.insert(&mut store, v);
-    }
+    let room = (SLOTS_A_POINT * sites.len() + 64).max(store.vertices.len()) + 2048 * threads;
+    let (mut store, left) = parallel::insert_rounds(store, sites, filter, &rounds, threads, room);
+    alone(&mut store, &mut left.into_iter());
     store
+}
+
+/// Insertion by one thread.
+struct Alone<'a> {
+    store: &'a mut Plain,
+    memory: &'a mut Memory,
+    sites: &'a [Site],
+    filter: Filter,
+    vertices: &'a mut dyn Iterator<Item = u32>,
+}
+
+impl Task for Alone<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        let mut inserter = Inserter {
+            sites: self.sites,
+            filter: self.filter,
+            lanes,
+            memory: self.memory,
+        };
+        for v in self.vertices {
+            let done = inserter.insert(self.store, v);
+            debug_assert!(done, "nothing is in the way of one thread");
+        }
+    }
 }
 
 /// What the points span.
@@ -146,15 +178,16 @@ enum Simplex {
 }
 
 /// The first affinely independent points, exactly.
-fn first_simplex(points: &[DVec3]) -> Simplex {
-    if points.len() < 2 {
+fn first_simplex(sites: &[Site]) -> Simplex {
+    let points = |i: usize| sites[i].point();
+    if sites.len() < 2 {
         return Simplex::Flat(0);
     }
-    let Some(c) = (2..points.len()).find(|&i| !collinear(points[0], points[1], points[i])) else {
+    let Some(c) = (2..sites.len()).find(|&i| !collinear(points(0), points(1), points(i))) else {
         return Simplex::Flat(1);
     };
-    let side = |i: usize| orient3d(points[0], points[1], points[c], points[i]);
-    match (2..points.len()).find(|&i| side(i) != 0.0) {
+    let side = |i: usize| orient3d(points(0), points(1), points(c), points(i));
+    match (2..sites.len()).find(|&i| side(i) != 0.0) {
         Some(d) if side(d) > 0.0 => Simplex::Tetrahedron([0, 1, c as u32, d as u32]),
         Some(d) => Simplex::Tetrahedron([1, 0, c as u32, d as u32]),
         None => Simplex::Flat(2),

@@ -20,6 +20,8 @@ const SMALLEST_ROUND: usize = 64;
 pub(super) struct InsertionOrder {
     /// Indices of the points.
     pub indices: Vec<u32>,
+    /// Position of each on the curve, a whole number below `2^60`.
+    pub positions: Vec<f64>,
     /// End of each round in `indices`.
     pub ends: Vec<u32>,
 }
@@ -49,10 +51,18 @@ pub(super) fn insertion_order(points: &[DVec3], bounds: [DVec3; 2]) -> Insertion
         .map(|r| keys.partition_point(|&k| round_of(k) <= r) as u32)
         .collect();
     let indices = keys
-        .into_iter()
+        .iter()
         .map(|k| (k & ((1 << index_bits) - 1)) as u32)
         .collect();
-    InsertionOrder { indices, ends }
+    let positions = keys
+        .iter()
+        .map(|k| (k >> index_bits & ((1 << (3 * bits)) - 1)) as f64)
+        .collect();
+    InsertionOrder {
+        indices,
+        positions,
+        ends,
+    }
 }
 
 /// Number of rounds for `n` points.
@@ -148,6 +158,7 @@ mod tests {
         let InsertionOrder {
             indices: mut order,
             ends,
+            ..
         } = insertion_order(&points, [DVec3::ZERO, DVec3::splat(3000.0)]);
         assert!(ends.len() == 2 && ends[1] == 3000);
         order.sort_unstable();

@@ -1,59 +1,73 @@
-//! Many threads inserting into one triangulation.
+//! Many threads inserting into one triangulation, each among its own tetrahedra.
 //!
 //! In: a triangulation of the first rounds and the points of the others. Out: the triangulation of all but a few points, which
-//! were given up and are left to one thread. Steps, for each round: (1) its points, which follow a Hilbert curve, are cut into
-//! one stretch a thread, so that threads work far apart; (2) every thread inserts as alone, but takes each tetrahedron it
-//! looks at by a compare-and-swap on its owner word before anything is written; meeting another thread's it lets go of
-//! everything and puts the point off (Batista et al. 2010, "Parallel geometric algorithms for multi-core computers", lock
-//! cells likewise); (3) a thread that is done helps with the stretches of others.
+//! are left to one thread. Steps, for each round (after Marot, Pellerin & Remacle 2019, "One machine, one minute, three
+//! billion tetrahedra"):
+//! 1. the space-filling curve is cut into one stretch a thread, so that each has as many points to insert; a thread owns the
+//!    tetrahedra of whose vertices at least three lie on its stretch;
+//! 2. every thread inserts its points as alone, but puts a point off when the walk or the cavity, with the tetrahedra around
+//!    it, leaves its own;
+//! 3. the curve is cut elsewhere, and points put off are tried again; after a few passes they wait for the next round.
 //!
-//! All shared words are atomic, so no `unsafe` is needed; on common processors a relaxed load or store is a plain one. Data
-//! of a tetrahedron is written while its owner word is held and published by releasing it. A walk reads without taking, so it
-//! can lose its way among changes; the tetrahedron it ends in is taken and tested again. Freed slots stay owned, so a walk
-//! that ends in one is refused. Which thread wins a race decides the numbering only: the set of tetrahedra is canonical.
+//! Nothing is locked. An insertion changes only tetrahedra that its thread owns; what it makes has the new point and two
+//! vertices of an owned facet, so it is owned again; and the neighbours it looks at have two vertices on the stretch, so no
+//! other thread owns, and changes, them. Only walks read what others write, and their ends are tested. All shared words are
+//! atomic because the language cannot see this; on common processors a relaxed load or store is a plain one. Which points
+//! wait decides the numbering only: the set of tetrahedra is canonical.
 
 use super::filter::Filter;
-use super::insertion::Inserter;
-use super::store::{Plain, Store};
-use glam::DVec3;
+use super::insertion::{Inserter, Memory};
+use super::lanes::{Lanes, Site, Task, with_lanes};
+use super::store::{INSIDE, NOTHING, Plain, SEEN, Store, VERTEX};
+use rayon::prelude::*;
 use std::ops::Range;
-use std::sync::atomic::{
-    AtomicBool, AtomicU32, AtomicUsize, Ordering::Acquire, Ordering::Relaxed, Ordering::Release,
-};
-
-/// Points taken from a stretch at a time.
-const CHUNK: usize = 64;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 
 /// Slots a thread takes from the common store at a time.
 const SLOTS: u32 = 1024;
+
+/// Where a pass begins to cut the curve, in stretches. The curve is closed for this purpose: one stretch may be the first
+/// part of it and the last.
+const CUTS: [f64; 2] = [0.0, 0.5];
+
+/// Fewer points than this a thread are not worth a pass.
+const WORTH_A_PASS: usize = 256;
 
 /// The common store.
 struct Shared {
     vertices: Vec<[AtomicU32; 4]>,
     neighbours: Vec<[AtomicU32; 4]>,
-    /// 0 for a tetrahedron nobody holds; else the holder's tag and, in the low bits, what it knows.
-    owners: Vec<AtomicU32>,
     /// First slot never used.
     next: AtomicU32,
     /// Set when a thread found no slot: all stop.
     full: AtomicBool,
 }
 
-/// Low bits of an owner word.
-const TAKEN: u32 = 0;
-const OUTSIDE: u32 = 1;
-const INSIDE: u32 = 2;
-/// A slot that holds no tetrahedron, or one that is being written.
-const SLOT: u32 = 3;
+/// Part of the closed curve: the positions `from..to`, or all others.
+#[derive(Clone, Copy)]
+struct Stretch {
+    from: f64,
+    to: f64,
+    others: bool,
+}
+
+impl Stretch {
+    #[inline(always)]
+    fn holds(self, site: &Site) -> bool {
+        let p = site.position();
+        ((p >= self.from) & (p < self.to)) != self.others
+    }
+}
 
 /// The common store as one thread sees it.
 struct Worker<'a> {
     shared: &'a Shared,
-    tag: u32,
+    stretch: Stretch,
     free: Vec<u32>,
     fresh: Range<u32>,
 }
 
+#[inline(always)]
 fn load(words: &[AtomicU32; 4]) -> [u32; 4] {
     [
         words[0].load(Relaxed),
@@ -63,9 +77,10 @@ fn load(words: &[AtomicU32; 4]) -> [u32; 4] {
     ]
 }
 
+#[inline(always)]
 fn store(words: &[AtomicU32; 4], values: [u32; 4]) {
-    for (word, value) in words.iter().zip(values) {
-        word.store(value, Relaxed);
+    for k in 0..4 {
+        words[k].store(values[k], Relaxed);
     }
 }
 
@@ -73,8 +88,17 @@ impl Store for Worker<'_> {
     const SHARED: bool = true;
 
     #[inline(always)]
+    fn slots(&self) -> u32 {
+        self.shared
+            .next
+            .load(Relaxed)
+            .min(self.shared.vertices.len() as u32)
+    }
+
+    #[inline(always)]
     fn tet(&self, tet: u32) -> [u32; 4] {
-        load(&self.shared.vertices[tet as usize])
+        let [a, b, c, d] = load(&self.shared.vertices[tet as usize]);
+        [a & VERTEX, b, c, d]
     }
 
     #[inline(always)]
@@ -103,45 +127,64 @@ impl Store for Worker<'_> {
     }
 
     #[inline(always)]
-    fn begin(&mut self) {}
-
-    #[inline(always)]
-    fn take(&mut self, tet: u32) -> bool {
-        let owner = &self.shared.owners[tet as usize];
-        match owner.load(Relaxed) {
-            0 => owner
-                .compare_exchange(0, self.tag | TAKEN, Acquire, Relaxed)
-                .is_ok(),
-            word => word & !3 == self.tag && word & 3 != SLOT,
-        }
+    fn owns(&self, sites: &[Site], v: [u32; 4]) -> bool {
+        // A slot being written by another thread holds vertices of that thread, old or new.
+        let holds = |v: u32| sites.get(v as usize).is_some_and(|s| self.stretch.holds(s));
+        v.into_iter().map(|v| u8::from(holds(v))).sum::<u8>() >= 3
     }
 
     #[inline(always)]
     fn visit(&mut self, tet: u32) -> usize {
-        let owner = &self.shared.owners[tet as usize];
-        let word = owner.load(Relaxed);
-        let first = u32::from(word == self.tag | TAKEN);
-        owner.store(word + first * OUTSIDE, Relaxed);
-        first as usize
+        let first = &self.shared.vertices[tet as usize][0];
+        let word = first.load(Relaxed);
+        first.store(word | SEEN, Relaxed);
+        usize::from(word >> 30 == 0)
     }
 
     #[inline(always)]
     fn note(&mut self, tet: u32, inside: bool) {
-        self.shared.owners[tet as usize].store(self.tag + OUTSIDE + u32::from(inside), Relaxed);
+        let first = &self.shared.vertices[tet as usize][0];
+        first.store(first.load(Relaxed) | u32::from(inside) << 31, Relaxed);
+    }
+
+    #[inline(always)]
+    fn is_seen(&self, tet: u32) -> bool {
+        self.shared.vertices[tet as usize][0].load(Relaxed) >= SEEN
     }
 
     #[inline(always)]
     fn is_inside(&self, tet: u32) -> bool {
-        self.shared.owners[tet as usize].load(Relaxed) == self.tag | INSIDE
+        self.shared.vertices[tet as usize][0].load(Relaxed) >= INSIDE
     }
 
     #[inline(always)]
-    fn is_outside(&self, tet: u32) -> bool {
-        self.shared.owners[tet as usize].load(Relaxed) == self.tag | OUTSIDE
+    fn forget(&mut self, tet: u32) {
+        let first = &self.shared.vertices[tet as usize][0];
+        first.store(first.load(Relaxed) & VERTEX, Relaxed);
     }
 
     #[inline(always)]
     fn reserve(&mut self, needed: usize) -> bool {
+        self.free.len() + self.fresh.len() >= needed || self.take_slots(needed)
+    }
+
+    #[inline(always)]
+    fn slot(&mut self) -> u32 {
+        let slot = self.free.pop().or_else(|| self.fresh.next());
+        slot.expect("slots were reserved")
+    }
+
+    #[inline(always)]
+    fn free(&mut self, tet: u32) {
+        store(&self.shared.vertices[tet as usize], NOTHING);
+        self.free.push(tet);
+    }
+}
+
+impl Worker<'_> {
+    /// Takes slots from the common store; `false` when there are none.
+    #[cold]
+    fn take_slots(&mut self, needed: usize) -> bool {
         while self.free.len() + self.fresh.len() < needed {
             let start = self.shared.next.fetch_add(SLOTS, Relaxed);
             if u64::from(start) + u64::from(SLOTS) > self.shared.vertices.len() as u64 {
@@ -154,94 +197,151 @@ impl Store for Worker<'_> {
         }
         true
     }
-
-    #[inline(always)]
-    fn slot(&mut self) -> u32 {
-        let slot = self.free.pop().or_else(|| self.fresh.next());
-        let slot = slot.expect("slots were reserved");
-        self.shared.owners[slot as usize].store(self.tag | SLOT, Relaxed);
-        slot
-    }
-
-    #[inline(always)]
-    fn free(&mut self, tet: u32) {
-        self.shared.owners[tet as usize].store(self.tag | SLOT, Relaxed);
-        self.free.push(tet);
-    }
-
-    #[inline(always)]
-    fn release(&mut self, tet: u32) {
-        self.shared.owners[tet as usize].store(0, Release);
-    }
 }
 
-/// Inserts the points of `rounds` (ranges of vertices, one after the other) with `threads` threads into a store that already
-/// holds a triangulation; `room` is the number of slots to work in. Returns the store and the points given up.
+/// Inserts the points of `rounds` (ranges of vertices, one after the other, each in the order of the curve) with `threads`
+/// threads into a store that already holds a triangulation; `room` is the number of slots to work in. Returns the store and
+/// the points left over, in order.
 pub(super) fn insert_rounds(
     plain: Plain,
-    points: &[DVec3],
+    sites: &[Site],
     filter: Filter,
     rounds: &[Range<u32>],
     threads: usize,
     room: usize,
 ) -> (Plain, Vec<u32>) {
-    let start = plain.used().next().expect("a triangulation to start from");
-    let next = plain.vertices.len() as u32;
+    let start = plain.any().expect("a triangulation to start from");
     let shared = share(plain, room);
-    let mut workers: Vec<(Worker, Inserter, Vec<u32>)> = (0..threads as u32)
-        .map(|i| {
+    let mut workers: Vec<(Worker, Memory)> = (0..threads)
+        .map(|_| {
             let worker = Worker {
                 shared: &shared,
-                tag: (i + 1) << 2,
+                stretch: Stretch {
+                    from: 0.0,
+                    to: 0.0,
+                    others: false,
+                },
                 free: Vec::new(),
                 fresh: 0..0,
             };
-            (worker, Inserter::new(points, filter, start), Vec::new())
+            (worker, Memory::new(sites.len(), start))
         })
         .collect();
-    debug_assert!(next <= shared.next.load(Relaxed));
+    let mut waiting = Vec::new();
     for round in rounds {
-        insert_round(&mut workers, &shared.full, round.clone());
+        waiting.extend(round.clone());
+        for cut in CUTS {
+            if waiting.len() < WORTH_A_PASS * threads || shared.full.load(Relaxed) {
+                break;
+            }
+            let position = |&v: &u32| sites[v as usize].position();
+            waiting.sort_by(|a, b| position(a).total_cmp(&position(b)).then(a.cmp(b)));
+            waiting = pass(
+                &mut workers,
+                sites,
+                filter,
+                &waiting,
+                &cuts(sites, round, threads, cut),
+            );
+        }
     }
     let mut free = Vec::new();
-    let mut given_up = Vec::new();
-    for (worker, _, put_off) in workers {
+    for (worker, _) in workers {
         free.extend(worker.free);
         free.extend(worker.fresh);
-        given_up.extend(put_off);
     }
-    given_up.sort_unstable();
-    (unshare(shared, free), given_up)
+    waiting.sort_unstable();
+    (unshare(shared, free), waiting)
 }
 
-/// One round: a stretch of points for each worker, then help for the others.
-fn insert_round(workers: &mut [(Worker, Inserter, Vec<u32>)], full: &AtomicBool, round: Range<u32>) {
+/// Positions at which `count` stretches begin: those of points evenly spaced in a round, the first `shift` stretches from its
+/// beginning. Points put off lie around the cuts of an earlier pass, so the cuts do not depend on them.
+fn cuts(sites: &[Site], round: &Range<u32>, count: usize, shift: f64) -> Vec<f64> {
+    let place = |i: usize| ((i as f64 + shift) / count as f64 * round.len() as f64) as usize;
+    (0..count)
+        .map(|i| sites[round.start as usize + place(i)].position())
+        .collect()
+}
+
+/// Every worker tries its part of `points`, which follow the curve; returns those put off.
+fn pass(
+    workers: &mut [(Worker, Memory)],
+    sites: &[Site],
+    filter: Filter,
+    points: &[u32],
+    cuts: &[f64],
+) -> Vec<u32> {
     let count = workers.len();
-    let bound = |i: usize| round.start as usize + round.len() * i / count;
-    let stretches: Vec<(AtomicUsize, usize)> = (0..count)
-        .map(|i| (AtomicUsize::new(bound(i)), bound(i + 1)))
+    // Points of equal position are on the same side of a cut, so that a point and its tetrahedra belong to the same thread.
+    let bounds: Vec<usize> = cuts
+        .iter()
+        .map(|&cut| points.partition_point(|&v| sites[v as usize].position() < cut))
         .collect();
-    let stretches = stretches.as_slice();
-    rayon::scope(|scope| {
-        for (i, (worker, inserter, put_off)) in workers.iter_mut().enumerate() {
-            scope.spawn(move |_| {
-                for k in 0..count {
-                    let (cursor, end) = &stretches[(i + k) % count];
-                    loop {
-                        let from = cursor.fetch_add(CHUNK, Relaxed);
-                        if from >= *end {
-                            break;
-                        }
-                        for v in from as u32..(from + CHUNK).min(*end) as u32 {
-                            if full.load(Relaxed) || !inserter.insert(worker, v) {
-                                put_off.push(v);
-                            }
-                        }
-                    }
-                }
-            });
+    let put_off: Vec<Vec<u32>> = workers
+        .par_iter_mut()
+        .enumerate()
+        .with_max_len(1)
+        .map(|(i, (worker, memory))| {
+            let next = (i + 1) % count;
+            let (from, to) = (bounds[i], bounds[next]);
+            let wraps = next == 0;
+            worker.stretch = Stretch {
+                from: if wraps { cuts[0] } else { cuts[i] },
+                to: if wraps { cuts[i] } else { cuts[next] },
+                others: wraps,
+            };
+            let parts = if wraps {
+                [&points[from..], &points[..to]]
+            } else {
+                [&points[from..to], &[]]
+            };
+            with_lanes(Part {
+                worker,
+                memory,
+                sites,
+                filter,
+                parts,
+            })
+        })
+        .collect();
+    put_off.concat()
+}
+
+/// One thread's part of a pass.
+struct Part<'a, 'b> {
+    worker: &'a mut Worker<'b>,
+    memory: &'a mut Memory,
+    sites: &'a [Site],
+    filter: Filter,
+    parts: [&'a [u32]; 2],
+}
+
+impl Task for Part<'_, '_> {
+    type Output = Vec<u32>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) -> Vec<u32> {
+        let Self {
+            worker,
+            memory,
+            sites,
+            filter,
+            parts,
+        } = self;
+        let mut inserter = Inserter {
+            sites,
+            filter,
+            lanes,
+            memory,
+        };
+        let mut put_off = Vec::new();
+        for &v in parts.into_iter().flatten() {
+            if worker.shared.full.load(Relaxed) || !inserter.insert(worker, v) {
+                put_off.push(v);
+            }
         }
-    });
+        put_off
+    }
 }
 
 /// Makes every word atomic and adds room. The arrays are converted in place.
@@ -249,19 +349,12 @@ fn share(plain: Plain, room: usize) -> Shared {
     let Plain {
         mut vertices,
         mut neighbours,
-        free,
         ..
     } = plain;
     let used = vertices.len();
     let room = room.max(used);
-    vertices.resize(room, [0; 4]);
+    vertices.resize(room, NOTHING);
     neighbours.resize(room, [0; 4]);
-    let mut owners: Vec<AtomicU32> = Vec::new();
-    owners.resize_with(room, AtomicU32::default);
-    // Slots that one thread freed go to nobody in particular: they are sealed and come back at the end.
-    for &slot in &free {
-        owners[slot as usize].store(u32::MAX, Relaxed);
-    }
     let atomic = |words: Vec<[u32; 4]>| {
         words
             .into_iter()
@@ -271,26 +364,22 @@ fn share(plain: Plain, room: usize) -> Shared {
     Shared {
         vertices: atomic(vertices),
         neighbours: atomic(neighbours),
-        owners,
         next: AtomicU32::new(used as u32),
         full: AtomicBool::new(false),
     }
 }
 
 /// Plain arrays again.
-fn unshare(shared: Shared, mut free: Vec<u32>) -> Plain {
+fn unshare(shared: Shared, free: Vec<u32>) -> Plain {
     let used = shared.next.into_inner() as usize;
-    free.extend(
-        (0u32..)
-            .zip(&shared.owners)
-            .filter(|(_, w)| w.load(Relaxed) == u32::MAX)
-            .map(|(i, _)| i),
-    );
-    drop(shared.owners);
     let plain = |words: Vec<[AtomicU32; 4]>| -> Vec<[u32; 4]> {
         let mut words: Vec<[u32; 4]> = words.into_iter().map(|w| w.map(AtomicU32::into_inner)).collect();
         words.truncate(used);
         words
     };
-    Plain::from_parts(plain(shared.vertices), plain(shared.neighbours), free)
+    Plain {
+        vertices: plain(shared.vertices),
+        neighbours: plain(shared.neighbours),
+        free,
+    }
 }

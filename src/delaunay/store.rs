@@ -1,45 +1,58 @@
 //! Where tetrahedra are kept while they are built: plain arrays for one thread, atomic ones for many.
 //!
-//! Both are structures of arrays of `u32`: four vertices, four neighbours (packed as `4 * tet + facet`) and one word of state
-//! for each tetrahedron. The insertion is written once, over [`Store`]; a store also answers whether a tetrahedron may be
-//! touched, which with one thread is always so.
+//! Both are structures of arrays of `u32`: four vertices and four neighbours (packed as `4 * tet + facet`). The two highest
+//! bits of the first vertex note what the current insertion knows of a tetrahedron; they are clear between insertions. The
+//! insertion is written once, over [`Store`]; a store also answers whether a tetrahedron may be touched, which with one
+//! thread is always so.
+
+use super::insertion::INF;
+use super::lanes::Site;
+
+/// Bit of the first vertex: the tetrahedron was looked at.
+pub(super) const SEEN: u32 = 1 << 30;
+/// Bit of the first vertex: and it is in conflict.
+pub(super) const INSIDE: u32 = 1 << 31;
+/// The first vertex without its notes.
+pub(super) const VERTEX: u32 = SEEN - 1;
+/// Vertices of a slot that holds no tetrahedron.
+pub(super) const NOTHING: [u32; 4] = [INF; 4];
 
 /// Tetrahedra under construction, as one thread sees them.
 pub(super) trait Store {
     /// Whether other threads work on the same tetrahedra.
     const SHARED: bool;
-    /// Vertices of a tetrahedron.
+    /// Number of slots, with and without tetrahedra.
+    fn slots(&self) -> u32;
+    /// Vertices of a tetrahedron; the first is [`VERTEX`] in a slot that holds none.
     fn tet(&self, tet: u32) -> [u32; 4];
     /// Neighbours of a tetrahedron.
     fn neighbours(&self, tet: u32) -> [u32; 4];
     /// One neighbour.
     fn neighbour(&self, tet: u32, facet: usize) -> u32;
-    /// Writes the vertices.
+    /// Writes the vertices; nothing is noted.
     fn set_tet(&mut self, tet: u32, vertices: [u32; 4]);
     /// Writes the neighbours.
     fn set_neighbours(&mut self, tet: u32, neighbours: [u32; 4]);
     /// Writes the neighbour across a packed facet.
     fn set_neighbour(&mut self, facet: u32, neighbour: u32);
-    /// Begins an insertion: every tetrahedron is new.
-    fn begin(&mut self);
-    /// Makes sure that a tetrahedron is taken by this thread; `false` when another holds it.
-    fn take(&mut self, tet: u32) -> bool;
-    /// Visits a taken tetrahedron: 1 the first time, when it is noted as outside, else 0.
+    /// Whether this thread may touch a tetrahedron of these vertices.
+    fn owns(&self, sites: &[Site], vertices: [u32; 4]) -> bool;
+    /// Visits a tetrahedron: 1 the first time, else 0.
     fn visit(&mut self, tet: u32) -> usize;
     /// Notes whether a visited tetrahedron is in conflict.
     fn note(&mut self, tet: u32, inside: bool);
+    /// Whether a tetrahedron was visited.
+    fn is_seen(&self, tet: u32) -> bool;
     /// Whether a visited tetrahedron is in conflict.
     fn is_inside(&self, tet: u32) -> bool;
-    /// Whether a taken tetrahedron was visited and is not in conflict.
-    fn is_outside(&self, tet: u32) -> bool;
+    /// Forgets what was noted.
+    fn forget(&mut self, tet: u32);
     /// Makes sure that `needed` slots can be had from [`Self::slot`]; `false` when there is no room.
     fn reserve(&mut self, needed: usize) -> bool;
-    /// A slot for a new tetrahedron, taken.
+    /// A slot for a new tetrahedron.
     fn slot(&mut self) -> u32;
     /// Gives a slot back.
     fn free(&mut self, tet: u32);
-    /// Lets go of a taken tetrahedron.
-    fn release(&mut self, tet: u32);
 }
 
 /// Plain arrays.
@@ -47,9 +60,6 @@ pub(super) trait Store {
 pub(super) struct Plain {
     pub vertices: Vec<[u32; 4]>,
     pub neighbours: Vec<[u32; 4]>,
-    /// Last insertion that looked at a tetrahedron and what it found: `2 * insertion + inside`.
-    stamps: Vec<u32>,
-    insertion: u32,
     /// Slots that hold no tetrahedron.
     pub free: Vec<u32>,
 }
@@ -60,25 +70,13 @@ impl Plain {
         Self {
             vertices: Vec::with_capacity(capacity),
             neighbours: Vec::with_capacity(capacity),
-            stamps: Vec::with_capacity(capacity),
-            ..Self::default()
+            free: Vec::new(),
         }
     }
 
-    /// A store of given tetrahedra.
-    pub(super) fn from_parts(vertices: Vec<[u32; 4]>, neighbours: Vec<[u32; 4]>, free: Vec<u32>) -> Self {
-        Self {
-            stamps: vec![0; vertices.len()],
-            vertices,
-            neighbours,
-            insertion: 0,
-            free,
-        }
-    }
-
-    /// Slots that hold a tetrahedron.
-    pub(super) fn used(&self) -> impl Iterator<Item = u32> + '_ {
-        (0..self.vertices.len() as u32).filter(|tet| !self.free.contains(tet))
+    /// A slot that holds a tetrahedron.
+    pub(super) fn any(&self) -> Option<u32> {
+        self.vertices.iter().position(|v| *v != NOTHING).map(|i| i as u32)
     }
 
     /// Grows by an eighth instead of doubling, which would pass the memory that is promised.
@@ -87,7 +85,6 @@ impl Plain {
         let more = (self.vertices.len() / 8).max(1024);
         self.vertices.reserve_exact(more);
         self.neighbours.reserve_exact(more);
-        self.stamps.reserve_exact(more);
     }
 }
 
@@ -95,8 +92,14 @@ impl Store for Plain {
     const SHARED: bool = false;
 
     #[inline(always)]
+    fn slots(&self) -> u32 {
+        self.vertices.len() as u32
+    }
+
+    #[inline(always)]
     fn tet(&self, tet: u32) -> [u32; 4] {
-        self.vertices[tet as usize]
+        let [a, b, c, d] = self.vertices[tet as usize];
+        [a & VERTEX, b, c, d]
     }
 
     #[inline(always)]
@@ -125,37 +128,37 @@ impl Store for Plain {
     }
 
     #[inline(always)]
-    fn begin(&mut self) {
-        self.insertion += 1;
-    }
-
-    #[inline(always)]
-    fn take(&mut self, _tet: u32) -> bool {
+    fn owns(&self, _sites: &[Site], _vertices: [u32; 4]) -> bool {
         true
     }
 
     #[inline(always)]
     fn visit(&mut self, tet: u32) -> usize {
-        let stamp = &mut self.stamps[tet as usize];
-        // Stamps only grow. Without a branch: which it will be cannot be foreseen.
-        let first = *stamp < 2 * self.insertion;
-        *stamp = (*stamp).max(2 * self.insertion);
-        usize::from(first)
+        // Without a branch: which it will be cannot be foreseen.
+        let first = &mut self.vertices[tet as usize][0];
+        let seen = *first >> 30;
+        *first |= SEEN;
+        usize::from(seen == 0)
     }
 
     #[inline(always)]
     fn note(&mut self, tet: u32, inside: bool) {
-        self.stamps[tet as usize] = 2 * self.insertion + u32::from(inside);
+        self.vertices[tet as usize][0] |= u32::from(inside) << 31;
+    }
+
+    #[inline(always)]
+    fn is_seen(&self, tet: u32) -> bool {
+        self.vertices[tet as usize][0] >= SEEN
     }
 
     #[inline(always)]
     fn is_inside(&self, tet: u32) -> bool {
-        self.stamps[tet as usize] == 2 * self.insertion + 1
+        self.vertices[tet as usize][0] >= INSIDE
     }
 
     #[inline(always)]
-    fn is_outside(&self, tet: u32) -> bool {
-        self.stamps[tet as usize] == 2 * self.insertion
+    fn forget(&mut self, tet: u32) {
+        self.vertices[tet as usize][0] &= VERTEX;
     }
 
     #[inline(always)]
@@ -171,17 +174,14 @@ impl Store for Plain {
         if self.vertices.len() == self.vertices.capacity() {
             self.grow();
         }
-        self.vertices.push([0; 4]);
+        self.vertices.push(NOTHING);
         self.neighbours.push([0; 4]);
-        self.stamps.push(0);
         (self.vertices.len() - 1) as u32
     }
 
     #[inline(always)]
     fn free(&mut self, tet: u32) {
+        self.vertices[tet as usize] = NOTHING;
         self.free.push(tet);
     }
-
-    #[inline(always)]
-    fn release(&mut self, _tet: u32) {}
 }
