@@ -12,7 +12,7 @@
 mod support;
 
 use medial_scaffold::geometry::{ClosestOnMesh, TriangleMesh};
-use medial_scaffold::segregation::{CloudSegregation, SegregationSettings, segregate_cloud};
+use medial_scaffold::segregation::{ClosedOrOpen, CloudSegregation, SegregationSettings, segregate_cloud};
 use std::time::Instant;
 use support::{corrupted, data_shape, shapes};
 
@@ -105,6 +105,9 @@ fn parse() -> Options {
     if args.iter().any(|a| a == "--no-second") {
         settings.second_opinion_noise = f64::INFINITY;
     }
+    if args.iter().any(|a| a == "--closed") {
+        settings.closed = ClosedOrOpen::Closed;
+    }
     Options {
         n: number("--n", 10_000.0) as usize,
         seeds: number("--seeds", 1.0) as u64,
@@ -159,7 +162,31 @@ fn run(name: &str, truth: &TriangleMesh, noise: f64, seed: u64, options: &Option
             r.prepare.kept,
             r.second_opinions.iter().map(|o| o.euler).collect::<Vec<_>>(),
             seconds,
-            r.doubts.join("; "),
+            r.doubts
+                .iter()
+                .map(|d| format!("{:?}", d.kind))
+                .collect::<Vec<_>>()
+                .join(" "),
+        );
+        let c = &r.self_check;
+        println!(
+            "      far {} spikes {} farthest {:.2} handles {:?} removed {:?} thin {:.4} thinnest {:.2} patches {:?}",
+            c.far_points,
+            c.spikes,
+            c.farthest_over_spacing,
+            c.narrow_handles.iter().map(|h| h.rings).collect::<Vec<_>>(),
+            r.closing
+                .handles_removed
+                .iter()
+                .map(|h| (h.rings, h.filled, h.energy as f32))
+                .collect::<Vec<_>>(),
+            c.thin_share,
+            c.thinnest_over_spacing,
+            r.filled_holes
+                .iter()
+                .take(3)
+                .map(|p| (p.triangles, p.area_mm2 / spacing / spacing, p.place))
+                .collect::<Vec<_>>(),
         );
     }
     row

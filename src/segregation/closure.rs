@@ -6,31 +6,30 @@
 //! 1. Delaunay, circumspheres, facet weights.
 //! 2. Greedy gap transforms ([`super::gap_transforms`]): where the surface shows itself.
 //! 3. Signed diffusion ([`super::diffusion`]): what that says of every tetrahedron.
-//! 4. Minimum cut ([`super::min_cut`]): pull `clamp(x) min(3, r / s)`, a facet costs `0.02 + w`, a tenth of that when greedy.
-//! 5. Islands flipped, stars repaired ([`super::islands`], [`super::star_repair`]), twice; near points taken in.
-//! 6. Points still off the surface are dropped and all is done once more, so that no generator sits inside the solid.
+//! 4. Minimum cut with pull `clamp(x) min(3, r / s)`, made a manifold without narrow handles ([`super::labelling`]).
+//! 5. Points still off the surface, and points that stand alone on it, are dropped and all is done once more, so that no generator sits inside the solid.
 //!
 //! Labatut, Pons & Keriven 2009 use the same cut with lines of sight; a cloud has none, the diffusion takes their place.
 
-use super::adopt::{adopt_points, points_off};
+use super::adopt::points_off;
 use super::balls::Balls;
-use super::diffusion::{diffuse, slot};
+use super::diffusion::diffuse;
 use super::error::SegregationError;
 use super::facets::FacetDepths;
 use super::gap_transforms::{CostRule, GapTransforms, gap_transforms};
-use super::islands::{Island, flip_islands};
-use super::min_cut::min_cut;
-use super::star_repair::{StarRepair, repair_stars};
+use super::islands::Island;
+use super::labelling::{Labelled, LabellingProblem, RemovedHandle};
+use super::labels::boundary_triangles;
+use super::openness::{all_unsupported, unsupported};
+use super::star_repair::StarRepair;
 use crate::delaunay::{DelaunaySettings, Facet, Triangulation, delaunay};
 use crate::geometry::{TetId, VertexId};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// Energy of a facet of weight 0, so that the surface is short where nothing else speaks.
-const LEAST_FACET_COST: f32 = 0.02;
-/// Factor on the cost of facets that the greedy surface holds.
-const ACCEPTED_FACTOR: f32 = 0.1;
+/// Factor on the cost of facets without support in [`Closure::supported`].
+const UNSUPPORTED_FACTOR: f32 = 8.0;
 /// Largest weight of a tetrahedron's pull: a ball of three spacings or more is not noise.
 const MOST_PULL: f64 = 3.0;
 
@@ -53,12 +52,18 @@ pub struct Closure {
     pub repair: StarRepair,
     /// Points taken onto the surface at the end.
     pub adopted: usize,
+    /// Narrow handles that were not believed.
+    pub opened: Vec<RemovedHandle>,
     /// Points off the surface in the first run, dropped for the second.
     pub dropped: usize,
     /// Points off the surface at the end.
     pub off: usize,
     /// Iterations of the diffusion.
     pub iterations: usize,
+    /// Facet weights, kept for other labellings of the same triangulation.
+    pub depths: FacetDepths,
+    /// What every finite tetrahedron wants; positive: inside.
+    pub pull: Vec<f32>,
 }
 
 /// How the labelling is made.
@@ -72,7 +77,7 @@ pub struct ClosureSettings<'a> {
     pub preset: &'a [[u32; 3]],
 }
 
-/// Steps 1 to 5 for distinct points in lexicographic order; see the module.
+/// Steps 1 to 4 for distinct points in lexicographic order; see the module.
 ///
 /// # Errors
 /// [`SegregationError::FewPoints`] when they do not span space, [`SegregationError::Triangulation`] when they are refused.
@@ -84,7 +89,7 @@ pub fn close(
     close_once(points, spacing_mm, settings)
 }
 
-/// Step 6: closes once more without the points that `first` left off its surface. For closed shapes only: the closed surface
+/// Step 5: closes once more without the points that `first` left off its surface. For closed shapes only: the closed surface
 /// of an open one passes many of its points by.
 ///
 /// # Errors
@@ -95,10 +100,14 @@ pub fn close_without_off(
     spacing_mm: &[f64],
     settings: &ClosureSettings,
 ) -> Result<Closure, SegregationError> {
-    if first.off == 0 {
+    let mut off = points_off(&first.triangulation, &first.inside);
+    let alone = standing_alone(&first);
+    for &v in &alone {
+        off[v as usize] = true;
+    }
+    if first.off + alone.len() == 0 {
         return Ok(first);
     }
-    let off = points_off(&first.triangulation, &first.inside);
     let used: Vec<u32> = (0..points.len() as u32).filter(|&i| !off[i as usize]).collect();
     let mut place = vec![u32::MAX; points.len()];
     for (new, &old) in used.iter().enumerate() {
@@ -119,9 +128,19 @@ pub fn close_without_off(
     let second = close_once(&kept, &kept_spacing, &again)?;
     Ok(Closure {
         used,
-        dropped: first.off,
+        dropped: first.off + alone.len(),
         ..second
     })
+}
+
+/// Points of the surface all of whose triangles lack support: outliers that the surface reached for.
+fn standing_alone(closure: &Closure) -> Vec<u32> {
+    let triangles: Vec<[u32; 3]> = boundary_triangles(&closure.triangulation, &closure.inside)
+        .into_iter()
+        .map(|t| t.map(|v| v.0))
+        .collect();
+    let bare = unsupported(&closure.triangulation.points, &triangles, &closure.spacing_mm);
+    all_unsupported(closure.triangulation.points.len(), &triangles, &bare)
 }
 
 fn close_once(
@@ -150,31 +169,22 @@ fn close_once(
     );
     let diffusion = diffuse(&triangulation, &depths, &greedy.accepted);
     let pull = pulls(&triangulation, &balls, spacing_mm, &diffusion.value);
-    let mut inside = min_cut(&triangulation, &pull, |facet| {
-        let w = depths.weight(&triangulation, facet);
-        let factor = if greedy.accepted[slot(facet)] {
-            ACCEPTED_FACTOR
-        } else {
-            1.0
-        };
-        factor * (LEAST_FACET_COST + w)
-    });
-    let mut islands = Vec::new();
-    let mut repair = StarRepair::default();
-    for round in 0..2 {
-        islands.extend(flip_islands(
-            &triangulation,
-            &mut inside,
-            settings.least_component_share,
-        ));
-        let done = repair_stars(&triangulation, &pull, &mut inside);
-        repair = StarRepair {
-            pinched: if round == 0 { done.pinched } else { repair.pinched },
-            flips: repair.flips + done.flips,
-            left: done.left,
-        };
+    let Labelled {
+        inside,
+        islands,
+        repair,
+        adopted,
+        ..
+    } = LabellingProblem {
+        triangulation: &triangulation,
+        depths: &depths,
+        accepted: &greedy.accepted,
+        pull: &pull,
+        spacing_mm,
+        least_component_share: settings.least_component_share,
+        unsupported_factor: 1.0,
     }
-    let adopted = adopt_points(&triangulation, spacing_mm, &mut inside);
+    .cut(&pull);
     let off = points_off(&triangulation, &inside).iter().filter(|o| **o).count();
     Ok(Closure {
         used: (0..points.len() as u32).collect(),
@@ -184,11 +194,80 @@ fn close_once(
         islands,
         repair,
         adopted,
+        opened: Vec::new(),
         dropped: 0,
         off,
         iterations: diffusion.iterations,
+        depths,
+        pull,
         triangulation,
     })
+}
+
+impl Closure {
+    /// The labelling problem this closure solved, with one thing changed.
+    fn problem<'a>(&'a self, pull: &'a [f32], share: f64, unsupported_factor: f32) -> LabellingProblem<'a> {
+        LabellingProblem {
+            triangulation: &self.triangulation,
+            depths: &self.depths,
+            accepted: &self.greedy.accepted,
+            pull,
+            spacing_mm: &self.spacing_mm,
+            least_component_share: share,
+            unsupported_factor,
+        }
+    }
+
+    fn labelled(&self) -> Labelled {
+        Labelled {
+            inside: self.inside.clone(),
+            islands: self.islands.clone(),
+            repair: self.repair,
+            adopted: self.adopted,
+            opened: self.opened.clone(),
+        }
+    }
+
+    fn take(&mut self, labelled: Labelled) {
+        self.off = points_off(&self.triangulation, &labelled.inside)
+            .iter()
+            .filter(|o| **o)
+            .count();
+        self.inside = labelled.inside;
+        self.islands = labelled.islands;
+        self.repair = labelled.repair;
+        self.adopted = labelled.adopted;
+        self.opened = labelled.opened;
+    }
+
+    /// Gives up narrow handles ([`super::labelling`], step 3).
+    pub fn give_up_narrow_handles(&mut self, least_component_share: f64) {
+        let labelled = self
+            .problem(&self.pull, least_component_share, 1.0)
+            .without_narrow_handles(self.labelled());
+        if !labelled.opened.is_empty() {
+            self.take(labelled);
+        }
+    }
+
+    /// The labels had every pull been `factor` times what it is.
+    pub fn relabelled(&self, factor: f32, least_component_share: f64) -> Labelled {
+        let pull: Vec<f32> = self.pull.iter().map(|p| p * factor).collect();
+        let problem = self.problem(&pull, least_component_share, 1.0);
+        problem.without_narrow_handles(problem.cut(&pull))
+    }
+
+    /// The labels when triangles without support are dear: another way round where noise let a gap be filled (between two
+    /// ears), the same or nothing where a hole can only be closed across.
+    pub fn supported(&self, least_component_share: f64) -> Labelled {
+        self.problem(&self.pull, least_component_share, UNSUPPORTED_FACTOR)
+            .cut(&self.pull)
+    }
+
+    /// As [`Self::take`], for another module's choice.
+    pub fn replace_labels(&mut self, labelled: Labelled) {
+        self.take(labelled);
+    }
 }
 
 /// What every tetrahedron wants: the diffused sign, the more the larger its ball is against the spacing.

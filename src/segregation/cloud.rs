@@ -7,8 +7,8 @@
 //! 2. Close ([`super::closure`]), whatever the cloud is: a closed surface shows by its unsupported area how open it is.
 //! 3. Decide: open when 3 % or more of the area has no points to support it ([`super::openness`]). An open surface is the
 //!    greedy one, oriented where that can be done ([`super::orient`]).
-//! 4. Doubt: unsupported area, points off the surface, pinches left, and for strong noise a second and third thinning seed
-//!    that must agree on the Euler number; the majority is returned.
+//! 4. Second opinions: for strong noise a second and third thinning seed; the majority is returned.
+//! 5. Doubt ([`super::self_check`]): the result looks for its own faults.
 //!
 //! Cost: `O(n log n)` in practice.
 
@@ -19,7 +19,8 @@ use super::labels::{Segregation, boundary_triangles};
 use super::openness::{area_share, patches, rims, unsupported};
 use super::orient::orient;
 use super::prepare::{Cleaned, Prepared, clean, thin_out};
-use super::report::{ClosingReport, CloudReport, ComponentReport, Decision, SecondOpinion};
+use super::report::{ClosingReport, CloudReport, ComponentReport, Decision, SecondOpinion, Variation};
+use super::self_check::{doubts, pull_opinions, self_check};
 use crate::delaunay::Triangulation;
 use crate::geometry::{Neighbours, TriangleMesh, VertexId};
 use glam::DVec3;
@@ -107,11 +108,6 @@ pub struct CloudSegregation {
     pub report: CloudReport,
 }
 
-/// Share of points off the surface above which a result is doubtful.
-const DOUBTFUL_OFF: f64 = 0.01;
-/// Unsupported share above which a closed result is doubtful, as a share of the threshold.
-const NEAR_THRESHOLD: f64 = 0.5;
-
 /// Segregates a raw cloud; see the module.
 ///
 /// # Errors
@@ -191,7 +187,6 @@ pub(super) fn segregate_with_preset(
             seed: settings.seed,
         },
         opinions: Vec::new(),
-        disagreement: false,
     };
     Ok(PresetOutcome {
         cloud: finish(points, chosen, &known, settings)?,
@@ -230,7 +225,6 @@ struct Run {
 struct Chosen {
     run: Run,
     opinions: Vec<SecondOpinion>,
-    disagreement: bool,
 }
 
 fn close_prepared(
@@ -243,13 +237,42 @@ fn close_prepared(
         least_component_share: settings.least_component_share,
         preset,
     };
-    let first = close(&prepared.points, &prepared.spacing_mm, &closing)?;
+    let share = settings.least_component_share;
+    let mut first = close(&prepared.points, &prepared.spacing_mm, &closing)?;
+    prefer_supported(&mut first, settings);
     let judged = Judged::new(&first, &BTreeSet::new());
     if settings.denoise == Denoise::Off || !judged.decide(settings).closed {
+        first.give_up_narrow_handles(share);
         return Ok(first);
     }
-    close_without_off(first, &prepared.points, &prepared.spacing_mm, &closing)
+    let mut second = close_without_off(first, &prepared.points, &prepared.spacing_mm, &closing)?;
+    prefer_supported(&mut second, settings);
+    second.give_up_narrow_handles(share);
+    Ok(second)
 }
+
+/// Takes the labels with less unsupported area when that halves it and the solid stays: noise can fill the gap between two
+/// thin parts, which then looks like a large hole that was closed.
+fn prefer_supported(closure: &mut Closure, settings: &SegregationSettings) {
+    let now = Judged::new(closure, &BTreeSet::new());
+    if now.share < SUSPICIOUS * settings.open_area_share || settings.closed == ClosedOrOpen::Open {
+        return;
+    }
+    let mut other = closure.clone();
+    other.replace_labels(closure.supported(settings.least_component_share));
+    let judged = Judged::new(&other, &BTreeSet::new());
+    let most_off = closure.triangulation.points.len() / 50;
+    let volume = |c: &Closure| closed_mesh(c).signed_volume();
+    if judged.share < 0.5 * now.share
+        && other.off <= closure.off.max(most_off)
+        && volume(&other) > 0.5 * volume(closure)
+    {
+        *closure = other;
+    }
+}
+
+/// Share of the threshold from which unsupported area is looked into.
+const SUSPICIOUS: f64 = 0.25;
 
 /// A closed surface and which of its triangles points support.
 struct Judged {
@@ -284,10 +307,13 @@ impl Judged {
 }
 
 fn opinion(run: &Run) -> SecondOpinion {
-    let mesh = closed_mesh(&run.closure);
+    opinion_of(&closed_mesh(&run.closure), Variation::Thinning { seed: run.seed })
+}
+
+fn opinion_of(mesh: &TriangleMesh, variation: Variation) -> SecondOpinion {
     let t = mesh.topology();
     SecondOpinion {
-        seed: run.seed,
+        variation,
         euler: t.euler,
         components: t.components,
     }
@@ -310,7 +336,6 @@ fn with_second_opinions(
         return Ok(Chosen {
             run: first,
             opinions: Vec::new(),
-            disagreement: false,
         });
     }
     let mut runs = vec![first];
@@ -335,11 +360,9 @@ fn with_second_opinions(
         .rev()
         .max_by_key(|&i| votes(i))
         .expect("there is a first run");
-    let disagreement = votes(best) < opinions.len();
     Ok(Chosen {
         run: runs.swap_remove(best),
         opinions,
-        disagreement,
     })
 }
 
@@ -355,7 +378,6 @@ fn finish(
             prepared, closure, ..
         },
         opinions,
-        disagreement,
     } = chosen;
     let judged = Judged::new(&closure, known);
     let decision = judged.decide(settings);
@@ -378,7 +400,23 @@ fn finish(
         open_surface(&closure)
     };
     report.decision = decision;
-    report.doubts = doubts(&report, disagreement, settings);
+    if segregation.closed {
+        let mesh = segregation.surface(&closure.triangulation);
+        report.self_check = self_check(
+            &closure,
+            &mesh,
+            &judged.bare,
+            &prepared.points,
+            &prepared.spacing_mm,
+        );
+        if report.self_check.thin_share > 0.0 && report.self_check.narrow_handles.is_empty() {
+            let more = pull_opinions(&closure, settings.least_component_share);
+            if report.second_opinions.is_empty() {
+                report.second_opinions.push(opinion_of(&mesh, Variation::None));
+            }
+            report.second_opinions.extend(more);
+        }
+    }
     let mut mesh = segregation.surface(&closure.triangulation);
     report.components = components(&mesh);
     if let Some(rank) = settings.component {
@@ -387,6 +425,7 @@ fn finish(
     }
     report.topology = mesh.topology();
     report.rims = rims(&mesh.points, &mesh.triangles);
+    report.doubts = doubts(&report, settings);
     if !segregation.closed && !report.rims.is_empty() {
         let rim = &report.rims[0];
         segregation.warnings.push(format!(
@@ -398,7 +437,9 @@ fn finish(
             rim.place.z
         ));
     }
-    segregation.warnings.extend(report.doubts.iter().cloned());
+    segregation
+        .warnings
+        .extend(report.doubts.iter().map(|d| d.text.clone()));
     let tree = Neighbours::new(&closure.triangulation.points);
     let nearest = tree
         .nearest_many(points)
@@ -485,45 +526,12 @@ fn closing_report(closure: &Closure, prepared: usize) -> ClosingReport {
         pinched: closure.repair.pinched,
         flips: closure.repair.flips,
         left_pinched: closure.repair.left,
+        handles_removed: closure.opened.clone(),
         adopted: closure.adopted,
         dropped: closure.dropped,
         off: closure.off,
         off_share: (closure.dropped.max(closure.off)) as f64 / prepared.max(1) as f64,
     }
-}
-
-fn doubts(report: &CloudReport, disagreement: bool, settings: &SegregationSettings) -> Vec<String> {
-    let mut out = Vec::new();
-    let share = report.decision.unsupported_area_share;
-    let factor = share / settings.open_area_share;
-    if !report.decision.closed && !report.decision.by_user && share > 0.0 && factor < 1.0 / NEAR_THRESHOLD {
-        out.push(format!(
-            "taken as open although only {:.2} % of its area has no points to support it: say which it is",
-            100.0 * share
-        ));
-    }
-    if report.decision.closed && factor >= NEAR_THRESHOLD {
-        out.push(format!(
-            "{:.2} % of the surface has no points to support it: compare the list of filled holes with the object",
-            100.0 * share
-        ));
-    }
-    if report.decision.closed && report.closing.off_share > DOUBTFUL_OFF {
-        out.push(format!(
-            "{:.2} % of the points ended off the surface: parts may be cut off",
-            100.0 * report.closing.off_share
-        ));
-    }
-    if disagreement {
-        let eulers: Vec<i64> = report.second_opinions.iter().map(|o| o.euler).collect();
-        out.push(format!(
-            "runs with other thinning seeds gave Euler numbers {eulers:?}: the topology is not certain"
-        ));
-    }
-    if report.closing.left_pinched > 0 {
-        out.push(format!("{} vertices stayed pinched", report.closing.left_pinched));
-    }
-    out
 }
 
 fn components(mesh: &TriangleMesh) -> Vec<ComponentReport> {

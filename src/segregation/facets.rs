@@ -15,7 +15,7 @@ use crate::geometry::TetId;
 use rayon::prelude::*;
 
 /// Own-side depths of all facets, indexed by tetrahedron and facet.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct FacetDepths {
     depth: Vec<[f32; 4]>,
 }

@@ -6,8 +6,9 @@
 //! * [`known_surface`]: a mesh or mask says where its surface is; one winding number a region ([`flood`]); [`refine`] adds
 //!   generators where that does not give the surface's topology.
 //! * [`cloud`]: a raw cloud is prepared ([`prepare`]: outliers, noise), shows its surface by greedy gap transforms
-//!   ([`gap_transforms`]), is closed ([`closure`]: [`diffusion`], [`min_cut`], [`islands`], [`star_repair`], [`adopt`]),
-//!   judged open or closed ([`openness`]), oriented ([`orient`]) and reported ([`report`]).
+//!   ([`gap_transforms`]), is closed ([`closure`]: [`diffusion`], [`labelling`] with [`min_cut`], [`islands`],
+//!   [`star_repair`], [`adopt`], [`handles`]), judged open or closed ([`openness`]), oriented ([`orient`]), reported
+//!   ([`report`]) and looked over for faults ([`self_check`]).
 //! * [`mesh_repair`]: a damaged mesh keeps its good triangles; the rest is found anew from its points.
 
 pub mod adopt;
@@ -19,9 +20,11 @@ pub mod error;
 pub mod facets;
 pub mod flood;
 pub mod gap_transforms;
+pub mod handles;
 pub mod islands;
 pub mod known_queries;
 pub mod known_surface;
+pub mod labelling;
 pub mod labels;
 pub mod mesh_repair;
 pub mod min_cut;
@@ -30,6 +33,7 @@ pub mod orient;
 pub mod prepare;
 pub mod refine;
 pub mod report;
+pub mod self_check;
 pub mod star_repair;
 mod stars;
 
@@ -46,3 +50,4 @@ pub use labels::{Segregation, boundary_facets, boundary_triangles};
 pub use mesh_repair::{Change, ChangeKind, MeshRepair, MeshRepairReport, segregate_mesh};
 pub use refine::{RefinedSegregation, segregate_known_refined};
 pub use report::CloudReport;
+pub use self_check::{Doubt, DoubtKind};

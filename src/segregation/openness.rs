@@ -43,12 +43,30 @@ pub struct Rim {
 pub fn unsupported(points: &[DVec3], triangles: &[[u32; 3]], spacing_mm: &[f64]) -> Vec<bool> {
     triangles
         .iter()
-        .map(|t| {
-            [(0, 1), (1, 2), (2, 0)].iter().any(|&(i, j)| {
-                let (a, b) = (t[i] as usize, t[j] as usize);
-                points[a].distance(points[b]) > UNSUPPORTED * 0.5 * (spacing_mm[a] + spacing_mm[b])
-            })
-        })
+        .map(|&t| has_long_edge(points, t, spacing_mm))
+        .collect()
+}
+
+/// Whether an edge of the triangle is longer than points with this spacing support.
+pub(super) fn has_long_edge(points: &[DVec3], t: [u32; 3], spacing_mm: &[f64]) -> bool {
+    [(0, 1), (1, 2), (2, 0)].iter().any(|&(i, j)| {
+        let (a, b) = (t[i] as usize, t[j] as usize);
+        points[a].distance(points[b]) > UNSUPPORTED * 0.5 * (spacing_mm[a] + spacing_mm[b])
+    })
+}
+
+/// Points all of whose triangles are marked, in order.
+pub(super) fn all_unsupported(points: usize, triangles: &[[u32; 3]], marked: &[bool]) -> Vec<u32> {
+    let mut used = vec![false; points];
+    let mut supported = vec![false; points];
+    for (t, bare) in triangles.iter().zip(marked) {
+        for &v in t {
+            used[v as usize] = true;
+            supported[v as usize] |= !bare;
+        }
+    }
+    (0..points as u32)
+        .filter(|&v| used[v as usize] && !supported[v as usize])
         .collect()
 }
 

@@ -1,8 +1,10 @@
 //! What a segregation of a raw cloud says of itself: decisions, numbers, holes, doubts.
 
 use super::islands::Island;
+use super::labelling::RemovedHandle;
 use super::openness::{Patch, Rim};
 use super::prepare::PrepareReport;
+use super::self_check::{Doubt, SelfCheck};
 use crate::geometry::MeshTopology;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -26,10 +28,12 @@ pub struct CloudReport {
     pub islands: Vec<Island>,
     /// Counts of the closing stage.
     pub closing: ClosingReport,
-    /// A run with other random choices, when one was made.
+    /// Numbers of the self-check of a closed surface.
+    pub self_check: SelfCheck,
+    /// The same with one thing changed: they should agree.
     pub second_opinions: Vec<SecondOpinion>,
     /// Reasons to look at the result before using it; empty when there are none.
-    pub doubts: Vec<String>,
+    pub doubts: Vec<Doubt>,
 }
 
 impl CloudReport {
@@ -86,6 +90,8 @@ pub struct ClosingReport {
     pub flips: usize,
     /// Pinched vertices after it.
     pub left_pinched: usize,
+    /// Narrow handles that were not believed: tunnels filled, bridges broken.
+    pub handles_removed: Vec<RemovedHandle>,
     /// Points taken onto the surface at the end.
     pub adopted: usize,
     /// Points off the surface, dropped before a second run.
@@ -96,11 +102,29 @@ pub struct ClosingReport {
     pub off_share: f64,
 }
 
-/// The outcome of a run with another seed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// What was different in a second opinion.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Variation {
+    /// Nothing: the result itself.
+    None,
+    /// Another seed of the thinning.
+    Thinning {
+        /// The seed.
+        seed: u64,
+    },
+    /// Every tetrahedron's pull times a factor.
+    Pull {
+        /// The factor.
+        factor: f64,
+    },
+}
+
+/// The outcome of a run with one thing changed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SecondOpinion {
-    /// Its seed.
-    pub seed: u64,
+    /// What was changed.
+    pub variation: Variation,
     /// Its Euler number.
     pub euler: i64,
     /// Its components.
