@@ -7,6 +7,7 @@ use medial_scaffold::geometry::Length;
 use medial_scaffold::input::repair::{RepairSettings, repair};
 use medial_scaffold::input::{self, Geometry, ReadSettings, Shape, read_shape};
 use medial_scaffold::pipeline::ScaffoldSettings;
+use medial_scaffold::segregation::{SegregationSettings, mend};
 use serde::Serialize;
 use std::path::Path;
 
@@ -60,7 +61,8 @@ pub struct Common {
     #[arg(long, value_name = "N", global = true, help_heading = "Input")]
     pub label: Option<i32>,
 
-    /// Mend meshes before use: join equal points, drop useless faces, turn faces outward; what was changed is listed.
+    /// Mend meshes before use: join equal points, drop useless faces, turn faces outward, close holes; what was changed is
+    /// listed.
     #[arg(long, global = true, help_heading = "Input")]
     pub repair: bool,
 
@@ -135,6 +137,21 @@ impl Side {
 impl Common {
     /// Reads a shape as these options say.
     pub fn read(&self, path: &Path) -> Result<Shape, Failure> {
+        let mut shape = self.read_faces(path)?;
+        if let (true, Geometry::Mesh(mesh)) = (self.repair, &mut shape.geometry) {
+            let settings = SegregationSettings {
+                seed: self.seed,
+                ..SegregationSettings::default()
+            };
+            let mended = mend(mesh, &settings)?;
+            shape.warnings.extend(mended.warnings());
+            *mesh = mended.mesh;
+        }
+        Ok(shape)
+    }
+
+    /// As [`Self::read`]; `--repair` mends points and faces only and leaves holes as they are.
+    pub fn read_faces(&self, path: &Path) -> Result<Shape, Failure> {
         let settings = ReadSettings {
             units: self.units.map(|u| match u {
                 Units::Mm => input::Units::Mm,

@@ -1,4 +1,4 @@
-//! `medial mesh`: a surface mesh of a cloud by segregation.
+//! `medial mesh`: a surface mesh of a cloud by segregation, or a mesh repaired (`--repair`).
 
 use super::common::Common;
 use super::output::{print_json, print_text};
@@ -9,13 +9,15 @@ use medial_scaffold::geometry::TriangleMesh;
 use medial_scaffold::input::Geometry;
 use medial_scaffold::pipeline::documents::SurfaceDocument;
 use medial_scaffold::reports::write_mesh;
-use medial_scaffold::segregation::{ClosedOrOpen, CostRule, Denoise, SegregationSettings, segregate_cloud};
+use medial_scaffold::segregation::{
+    ClosedOrOpen, CloudReport, CostRule, Denoise, SegregationSettings, mend, segregate_cloud,
+};
 use std::path::PathBuf;
 
 /// Arguments of `medial mesh`.
 #[derive(Debug, Args)]
 pub struct MeshArgs {
-    /// Point cloud; of a mesh the points are taken.
+    /// Point cloud; of a mesh the points are taken, with --repair its triangles too.
     cloud: PathBuf,
 
     /// Surface mesh to write: .ply, .stl, .obj, .off or .vtp.
@@ -62,7 +64,7 @@ pub fn run(args: &MeshArgs, common: &Common) -> Result<Verdict, Failure> {
             "nowhere to put the result; give a mesh file with -o FILE, or --json",
         ));
     }
-    let shape = common.read(&args.cloud)?;
+    let shape = common.read_faces(&args.cloud)?;
     let points = match &shape.geometry {
         Geometry::Cloud(cloud) => &cloud.points,
         Geometry::Mesh(mesh) => &mesh.points,
@@ -93,32 +95,57 @@ pub fn run(args: &MeshArgs, common: &Common) -> Result<Verdict, Failure> {
     };
     let progress = Progress::new(common.quiet);
     progress.stage("segregation");
+    if let (true, Geometry::Mesh(mesh)) = (common.repair, &shape.geometry) {
+        let mended = mend(mesh, &settings)?;
+        progress.finish();
+        warn_all(common, &shape.warnings);
+        warn_all(common, &mended.warnings());
+        return deliver(
+            args,
+            common,
+            &shape.name,
+            points.len(),
+            &mended.mesh,
+            &mended.segregation,
+        );
+    }
     let found = segregate_cloud(points, &settings)?;
     let whole = found.segregation.surface(&found.triangulation);
     let all: Vec<u32> = (0..whole.triangles.len() as u32).collect();
     let mesh: TriangleMesh = whole.submesh(&all);
-    if let Some(path) = &args.output {
-        write_mesh(path, &mesh, &[])?;
-    }
     progress.finish();
     warn_all(common, &shape.warnings);
     warn_all(common, &found.segregation.warnings);
-    let document = SurfaceDocument::new(points.len(), &mesh, &found.report);
+    deliver(args, common, &shape.name, points.len(), &mesh, &found.report)
+}
+
+/// Writes the mesh and says what it is.
+fn deliver(
+    args: &MeshArgs,
+    common: &Common,
+    name: &str,
+    points: usize,
+    mesh: &TriangleMesh,
+    report: &CloudReport,
+) -> Result<Verdict, Failure> {
+    if let Some(path) = &args.output {
+        write_mesh(path, mesh, &[])?;
+    }
+    let document = SurfaceDocument::new(points, mesh, report);
     if common.json {
         print_json(&document)?;
     } else if !common.quiet {
         print_text(&format!(
-            "{}: {} vertices, {} triangles, {} components, Euler number {}, {} open edges; {}\n",
-            shape.name,
+            "{name}: {} vertices, {} triangles, {} components, Euler number {}, {} open edges; {}\n",
             document.vertices,
             document.triangles,
             document.components,
             document.euler,
             document.boundary_edges,
-            found.report.decision.reason,
+            report.decision.reason,
         ))?;
     }
-    Ok(if found.report.doubtful() {
+    Ok(if report.doubtful() {
         Verdict::SaidNo
     } else {
         Verdict::Fine

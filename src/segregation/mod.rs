@@ -9,7 +9,7 @@
 //!   ([`gap_transforms`]), is closed ([`closure`]: [`diffusion`], [`labelling`] with [`min_cut`], [`islands`],
 //!   [`star_repair`], [`adopt`], [`handles`]), judged open or closed ([`openness`]), oriented ([`orient`]), reported
 //!   ([`report`]) and looked over for faults ([`self_check`]).
-//! * [`mesh_repair`]: a damaged mesh keeps its good triangles; the rest is found anew from its points.
+//! * [`mesh_repair`]: a damaged mesh keeps its good triangles; the rest is found anew from its points. [`mend`] closes holes.
 
 pub mod adopt;
 pub mod balls;
@@ -26,6 +26,7 @@ pub mod known_queries;
 pub mod known_surface;
 pub mod labelling;
 pub mod labels;
+pub mod mend;
 pub mod mesh_repair;
 pub mod min_cut;
 pub mod openness;
@@ -47,6 +48,7 @@ pub use known_surface::{
     segregate_known,
 };
 pub use labels::{Segregation, boundary_facets, boundary_triangles};
+pub use mend::{MendedMesh, Mending, mend};
 pub use mesh_repair::{Change, ChangeKind, MeshRepair, MeshRepairReport, segregate_mesh};
 pub use refine::{RefinedSegregation, segregate_known_refined};
 pub use report::CloudReport;

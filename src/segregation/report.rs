@@ -2,6 +2,7 @@
 
 use super::islands::Island;
 use super::labelling::RemovedHandle;
+use super::mesh_repair::MeshRepairReport;
 use super::openness::{Patch, Rim};
 use super::prepare::PrepareReport;
 use super::self_check::{Doubt, SelfCheck};
@@ -32,6 +33,8 @@ pub struct CloudReport {
     pub self_check: SelfCheck,
     /// The same with one thing changed: they should agree.
     pub second_opinions: Vec<SecondOpinion>,
+    /// What a mesh that was repaired kept and lost.
+    pub repair: Option<MeshRepairReport>,
     /// Reasons to look at the result before using it; empty when there are none.
     pub doubts: Vec<Doubt>,
 }
