@@ -5,6 +5,8 @@
 //! underflow. Steps: (1) finite check, (2) `-0.0` becomes `0.0`, (3) sort by (x, y, z), (4) merge equal points, (5) check
 //! that the range of exponents can be handled exactly. Cost: `O(n log n)`, `O(n)` when the points come sorted.
 
+use super::canonical::room;
+use super::order::radix_sort;
 use crate::geometry::predicates::lexicographic;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -187,7 +189,8 @@ pub fn prepare(points: &[DVec3]) -> Result<Generators, DelaunayError> {
         return Ok(out);
     }
     out.source = vec![0; points.len()];
-    for (p, i) in sorted(points) {
+    for i in lexicographic_order(points) {
+        let p = points[i as usize] + DVec3::ZERO;
         if out.points.last() != Some(&p) {
             out.points.push(p);
             out.multiplicity.push(0);
@@ -206,10 +209,35 @@ pub(super) fn distinct(points: &[DVec3]) -> Result<Vec<DVec3>, DelaunayError> {
         return Ok(points.iter().map(|&p| p + DVec3::ZERO).collect());
     }
     // Adding zero turns -0.0 into 0.0 and leaves every other number as it is.
-    let mut out: Vec<DVec3> = points.iter().map(|&p| p + DVec3::ZERO).collect();
-    out.par_sort_unstable_by(|&a, &b| lexicographic(a, b));
+    let mut out: Vec<DVec3> = Vec::with_capacity(points.len());
+    out.extend(lexicographic_order(points).map(|i| points[i as usize] + DVec3::ZERO));
     out.dedup();
     Ok(out)
+}
+
+/// Indices of finite points in lexicographic order, equal points in order of their indices: by the leading bits of x as whole
+/// numbers, then in full where those agree.
+fn lexicographic_order(points: &[DVec3]) -> impl Iterator<Item = u32> {
+    let index_bits = usize::BITS - points.len().leading_zeros();
+    let cells = ((1u64 << (u64::BITS - index_bits)) - 1) as f64 * 0.5;
+    let lo = points.iter().fold(f64::INFINITY, |m, p| m.min(p.x));
+    let hi = points.iter().fold(f64::NEG_INFINITY, |m, p| m.max(p.x));
+    let factor = cells / (hi - lo);
+    // Rounding is monotonic. Ranges beyond f64 make all keys equal or extreme, which is correct as well.
+    let key = |x: f64| (((x - lo) * factor).min(cells) as u64) << index_bits;
+    let mut keys: Vec<u64> = room(points.len());
+    keys.extend(points.iter().zip(0u64..).map(|(p, i)| key(p.x) | i));
+    radix_sort(&mut keys, index_bits);
+    let index = move |k: u64| (k & ((1 << index_bits) - 1)) as u32;
+    for run in keys.chunk_by_mut(|a, b| a >> index_bits == b >> index_bits) {
+        if run.len() > 1 {
+            run.par_sort_unstable_by(|&a, &b| {
+                let [p, q] = [a, b].map(|k| points[index(k) as usize]);
+                lexicographic(p, q).then(a.cmp(&b))
+            });
+        }
+    }
+    keys.into_iter().map(index)
 }
 
 /// Strictly increasing, so distinct too.
@@ -233,16 +261,6 @@ fn check(points: &[DVec3]) -> Result<(), DelaunayError> {
         Some((index, value)) => Err(DelaunayError::NotFinite { index, value }),
         None => Frame::of(points).map(|_| ()),
     }
-}
-
-fn sorted(points: &[DVec3]) -> Vec<(DVec3, u32)> {
-    let mut order: Vec<(DVec3, u32)> = points
-        .iter()
-        .zip(0..)
-        .map(|(&p, i)| (p + DVec3::ZERO, i))
-        .collect();
-    order.par_sort_unstable_by(|a, b| lexicographic(a.0, b.0).then(a.1.cmp(&b.1)));
-    order
 }
 
 #[cfg(test)]

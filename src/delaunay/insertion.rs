@@ -270,7 +270,7 @@ impl<L: Lanes> Inserter<'_, L> {
                 for k in 0..4 {
                     let other = n[k] >> 2;
                     // Before anything is noted: several threads may look at what none of them owns.
-                    if S::SHARED && !store.is_seen(other) && !store.owns(self.sites, store.tet(other)) {
+                    if S::SHARED && !store.owns(self.sites, store.tet(other)) {
                         denied = true;
                         visited += first;
                         break 'layer;

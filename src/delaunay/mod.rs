@@ -70,12 +70,14 @@ pub fn delaunay(points: &[DVec3], settings: &DelaunaySettings) -> Result<Triangu
         points.iter().map(|&p| frame.apply(p)).collect()
     };
     let order = order::insertion_order(&normalised, bounds);
-    let sites: Vec<Site> = order
-        .indices
-        .iter()
-        .zip(&order.positions)
-        .map(|(&i, &position)| Site::new(normalised[i as usize], position))
-        .collect();
+    // In memory that goes back to the system before the renumbering.
+    let mut sites = canonical::room(normalised.len());
+    let mut indices = canonical::room(normalised.len());
+    for (i, position) in order.iter() {
+        sites.push(Site::new(normalised[i as usize], position));
+        indices.push(i);
+    }
+    let ends = order.ends;
     drop(normalised);
     let first = match first_simplex(&sites) {
         Simplex::Tetrahedron(first) => first,
@@ -91,11 +93,11 @@ pub fn delaunay(points: &[DVec3], settings: &DelaunaySettings) -> Result<Triangu
         0 => rayon::current_num_threads(),
         n => n,
     };
-    let store = insert_all(&sites, Filter::new(bounds), &order.ends, first, threads);
+    let store = insert_all(&sites, Filter::new(bounds), &ends, first, threads);
     drop(sites);
     Ok(canonical::canonical(
         points,
-        &order.indices,
+        indices,
         store.vertices,
         store.neighbours,
     ))

@@ -3,9 +3,10 @@
 //! In: points. Out: their indices in the order of insertion. Steps: (1) every point draws a round, the last with probability
 //! 7/8, the one before with 7/64 and so on (Amenta, Choi & Rote 2003, "Incremental constructions con BRIO"), so that each
 //! round is a thin random sample of the next and the expected cost stays that of a random order; (2) within a round points
-//! follow a Hilbert curve (Skilling 2004, "Programming the Hilbert curve"), so that the walk from one to the next is short
-//! and the memory it touches is warm. The triangulation does not depend on the order; only the time does.
+//! follow a Hilbert curve (Hamilton 2006, "Compact Hilbert indices", as a table of states), so that the walk from one to the
+//! next is short and the memory it touches is warm. The triangulation does not depend on the order; only the time does.
 
+use super::canonical::{room, zeros};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -15,15 +16,15 @@ const ROUND_BITS: u32 = 4;
 /// Rounds end when one would hold fewer points than this.
 const SMALLEST_ROUND: usize = 64;
 
-/// Indices of the points in insertion order and where each round ends.
+/// The points in insertion order and where each round ends.
 #[derive(Clone, Debug)]
 pub(super) struct InsertionOrder {
-    /// Indices of the points.
-    pub indices: Vec<u32>,
-    /// Position of each on the curve, a whole number below `2^60`.
-    pub positions: Vec<f64>,
-    /// End of each round in `indices`.
+    /// Round, position on the curve, index, from the highest bit down.
+    keys: Vec<u64>,
+    /// End of each round.
     pub ends: Vec<u32>,
+    index_bits: u32,
+    position_bits: u32,
 }
 
 /// The order in which points are inserted.
@@ -44,24 +45,54 @@ pub(super) fn insertion_order(points: &[DVec3], bounds: [DVec3; 2]) -> Insertion
         let position = u64::from(round(i, rounds)) << (3 * bits) | hilbert(cell, bits);
         position << index_bits | u64::from(i)
     };
-    let mut keys: Vec<u64> = points.par_iter().zip(0..points.len() as u32).map(key).collect();
-    keys.par_sort_unstable();
+    let mut keys: Vec<u64> = room(points.len());
+    keys.par_extend(points.par_iter().zip(0..points.len() as u32).map(key));
+    radix_sort(&mut keys, index_bits);
     let round_of = |k: u64| (k >> (3 * bits + index_bits)) as u32;
     let ends = (0..rounds)
         .map(|r| keys.partition_point(|&k| round_of(k) <= r) as u32)
         .collect();
-    let indices = keys
-        .iter()
-        .map(|k| (k & ((1 << index_bits) - 1)) as u32)
-        .collect();
-    let positions = keys
-        .iter()
-        .map(|k| (k >> index_bits & ((1 << (3 * bits)) - 1)) as f64)
-        .collect();
     InsertionOrder {
-        indices,
-        positions,
+        keys,
         ends,
+        index_bits,
+        position_bits: 3 * bits,
+    }
+}
+
+impl InsertionOrder {
+    /// Indices of the points in insertion order, each with its position on the curve.
+    pub(super) fn iter(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
+        self.keys.iter().map(|k| {
+            let position = k >> self.index_bits & ((1 << self.position_bits) - 1);
+            ((k & ((1 << self.index_bits) - 1)) as u32, position as f64)
+        })
+    }
+}
+
+/// Bits sorted at a time.
+const DIGIT: u32 = 11;
+
+/// Sorts numbers by their bits from `low` up; equal ones keep their order.
+pub(super) fn radix_sort(keys: &mut Vec<u64>, low: u32) {
+    let significant = u64::BITS - keys.iter().fold(0, |all, k| all | k).leading_zeros();
+    let mut other = zeros(keys.len());
+    for shift in (low..significant).step_by(DIGIT as usize) {
+        let digit = |k: u64| (k >> shift) as usize & ((1 << DIGIT) - 1);
+        let mut places = [0u32; 1 << DIGIT];
+        for &k in keys.iter() {
+            places[digit(k)] += 1;
+        }
+        let mut sum = 0;
+        for place in &mut places {
+            (*place, sum) = (sum, sum + *place);
+        }
+        for &k in keys.iter() {
+            let place = &mut places[digit(k)];
+            other[*place as usize] = k;
+            *place += 1;
+        }
+        std::mem::swap(keys, &mut other);
     }
 }
 
@@ -90,36 +121,58 @@ fn mix(index: u64) -> u64 {
     z ^ (z >> 31)
 }
 
+/// One step of the curve, for each state (entry corner and direction, `3 * entry + direction`) and octant: the place of the
+/// octant along the curve and, above its three bits, the state within it.
+const STEPS: [[u8; 8]; 24] = {
+    let mut steps = [[0; 8]; 24];
+    let mut state = 0;
+    while state < 24 {
+        let (entry, direction) = (state as u32 / 3, state as u32 % 3);
+        let mut octant = 0;
+        while octant < 8 {
+            let gray = rotate_right(octant as u32 ^ entry, direction + 1);
+            let place = gray ^ gray >> 1 ^ gray >> 2;
+            let first = if place == 0 { 0 } else { (place - 1) & !1 };
+            let inner_entry = entry ^ rotate_left(first ^ first >> 1, direction + 1);
+            let turn = if place == 0 {
+                0
+            } else if place & 1 == 0 {
+                (place - 1).trailing_ones()
+            } else {
+                place.trailing_ones()
+            };
+            let inner = 3 * inner_entry + (direction + turn + 1) % 3;
+            steps[state][octant] = (place | inner << 3) as u8;
+            octant += 1;
+        }
+        state += 1;
+    }
+    steps
+};
+
+/// Three bits turned to the right.
+const fn rotate_right(v: u32, by: u32) -> u32 {
+    let by = by % 3;
+    (v >> by | v << (3 - by)) & 7
+}
+
+/// Three bits turned to the left.
+const fn rotate_left(v: u32, by: u32) -> u32 {
+    rotate_right(v, 3 - by % 3)
+}
+
 /// Position of a cell along the Hilbert curve.
 fn hilbert(cell: [u32; 3], bits: u32) -> u64 {
-    let mut x = cell;
-    let mut q = 1u32 << (bits - 1);
-    while q > 1 {
-        let p = q - 1;
-        for i in 0..3 {
-            if x[i] & q != 0 {
-                x[0] ^= p;
-            } else {
-                let t = (x[0] ^ x[i]) & p;
-                x[0] ^= t;
-                x[i] ^= t;
-            }
-        }
-        q >>= 1;
+    // The octants of all levels, highest first.
+    let octants = spread(cell[0]) | spread(cell[1]) << 1 | spread(cell[2]) << 2;
+    let mut state = 0;
+    let mut position = 0;
+    for level in (0..bits).rev() {
+        let step = STEPS[state as usize % 24][(octants >> (3 * level)) as usize & 7];
+        position = position << 3 | u64::from(step & 7);
+        state = step >> 3;
     }
-    x[1] ^= x[0];
-    x[2] ^= x[1];
-    let mut t = 0;
-    let mut q = 1u32 << (bits - 1);
-    while q > 1 {
-        if x[2] & q != 0 {
-            t ^= q - 1;
-        }
-        q >>= 1;
-    }
-    x.iter()
-        .zip([2, 1, 0])
-        .fold(0, |key, (&v, shift)| key | spread(v ^ t) << shift)
+    position
 }
 
 /// Moves bit `i` to bit `3 i`, for 21 bits.
@@ -155,12 +208,12 @@ mod tests {
         let points: Vec<DVec3> = (0..3000u32)
             .map(|i| DVec3::new(f64::from(i % 13), f64::from(i % 17), f64::from(i)))
             .collect();
-        let InsertionOrder {
-            indices: mut order,
-            ends,
-            ..
-        } = insertion_order(&points, [DVec3::ZERO, DVec3::splat(3000.0)]);
-        assert!(ends.len() == 2 && ends[1] == 3000);
+        let inserted = insertion_order(&points, [DVec3::ZERO, DVec3::splat(3000.0)]);
+        assert!(inserted.ends.len() == 2 && inserted.ends[1] == 3000);
+        let (mut order, positions): (Vec<u32>, Vec<f64>) = inserted.iter().unzip();
+        for round in [0..inserted.ends[0] as usize, inserted.ends[0] as usize..3000] {
+            assert!(positions[round].is_sorted());
+        }
         order.sort_unstable();
         assert!(order.into_iter().eq(0..3000));
     }

@@ -148,11 +148,6 @@ impl Store for Worker<'_> {
     }
 
     #[inline(always)]
-    fn is_seen(&self, tet: u32) -> bool {
-        self.shared.vertices[tet as usize][0].load(Relaxed) >= SEEN
-    }
-
-    #[inline(always)]
     fn is_inside(&self, tet: u32) -> bool {
         self.shared.vertices[tet as usize][0].load(Relaxed) >= INSIDE
     }

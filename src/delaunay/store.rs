@@ -41,8 +41,6 @@ pub(super) trait Store {
     fn visit(&mut self, tet: u32) -> usize;
     /// Notes whether a visited tetrahedron is in conflict.
     fn note(&mut self, tet: u32, inside: bool);
-    /// Whether a tetrahedron was visited.
-    fn is_seen(&self, tet: u32) -> bool;
     /// Whether a visited tetrahedron is in conflict.
     fn is_inside(&self, tet: u32) -> bool;
     /// Forgets what was noted.
@@ -144,11 +142,6 @@ impl Store for Plain {
     #[inline(always)]
     fn note(&mut self, tet: u32, inside: bool) {
         self.vertices[tet as usize][0] |= u32::from(inside) << 31;
-    }
-
-    #[inline(always)]
-    fn is_seen(&self, tet: u32) -> bool {
-        self.vertices[tet as usize][0] >= SEEN
     }
 
     #[inline(always)]
