@@ -33,6 +33,7 @@ mod result;
 mod score;
 mod settings;
 mod shape;
+mod significance;
 mod solve;
 mod surface;
 mod verdict;

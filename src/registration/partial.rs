@@ -9,7 +9,7 @@
 //!    400 points; within 6 degrees and 2.5 % of a better one dropped.
 //! 5. Twelve iterations 4 % to 2 % with 800 points, six with nearest points from the kd-tree to 1.5 %; the finest score decides.
 //!
-//! A second round with ten times the poses runs when the best score is below 0.6 or a rival over 15 degrees away has 70 % of it.
+//! A second round with ten times the poses runs when the best score is below 0.4 or a rival over 15 degrees away is within 0.4.
 //!
 //! Measured on carpals, both cut to two thirds by opposite half-spaces, 1 % noise: every stage above is wide enough that the
 //! right pose survives; see `BENCHMARKS.md`. Cost: about 0.3 s of one core after the views are made, 1 s for a second round.
@@ -56,14 +56,18 @@ const COARSE: ScoreScale = ScoreScale {
     inlier: 0.04,
     free: 0.05,
     cosine: 0.5,
+    violation: 1.0,
 };
 const MIDDLE: ScoreScale = ScoreScale {
     inlier: 0.025,
     free: 0.04,
     cosine: 0.6,
+    violation: 1.75,
 };
-/// A good score at 33 % overlap is 0.64, at 50 % 0.95.
-const GOOD_SCORE: f64 = 0.6;
+/// A second round is not needed above this score: half-overlapping bones at 1 % noise have it.
+const GOOD_SCORE: f64 = 0.4;
+/// ... when every rival is this far below: the most that a wrong pose was ahead of its rivals is 0.22.
+const CLEAR_MARGIN: f64 = 0.4;
 /// A rival is a pose farther than this, degrees.
 pub(crate) const RIVAL_DEG: f64 = 15.0;
 
@@ -74,13 +78,12 @@ pub(crate) fn partial(
     guesses: &[Rigid],
     poses: usize,
     escalated: usize,
-    rival_share: f64,
     seed: u64,
 ) -> Vec<PartialFit> {
     let table = PairTable::new(source, target);
     let first = round(source, target, &table, guesses, Budget::of(poses), seed);
     let sure = first.first().is_some_and(|best| {
-        best.score >= GOOD_SCORE && rival(&first).is_none_or(|r| r <= rival_share * best.score)
+        best.score >= GOOD_SCORE && rival(&first).is_none_or(|r| r <= best.score - CLEAR_MARGIN)
     });
     if sure || escalated <= poses {
         return first;

@@ -3,7 +3,9 @@
 //! In: two views and a pose. Out: inliers (close, with agreeing normals) minus violations: points that stick out where the
 //! other shape has surface, points inside its solid, walls thinner than the other's. A point beyond the other's border says
 //! nothing, and neither does one on the far side of the solid. The lower the overlap, the more of the decision is free space:
-//! at 20 % overlap inliers alone pick the right pose in 1 of 32 trials, with free space in 25.
+//! at 20 % overlap inliers alone pick the right pose in 1 of 32 trials, with free space in 25, with free space at 1.75 times its
+//! weight and a narrower inlier (1.3 instead of 1.5 %) in 27: wrong poses have more inliers than the right one, but also more
+//! violations and larger residuals. The weight counts once poses are refined; before that a right pose still violates.
 //!
 //! Cost: one table look-up a point.
 
@@ -20,6 +22,8 @@ pub(crate) struct ScoreScale {
     pub(crate) free: f64,
     /// Least cosine of the angle between the normals of an inlier.
     pub(crate) cosine: f64,
+    /// What a violation counts, in inliers.
+    pub(crate) violation: f64,
 }
 
 /// A wall may be this much thinner than the other shape's before it counts, in units.
@@ -35,7 +39,8 @@ pub(crate) fn one_way(moving: &View, count: usize, fixed: &View, pose: &Rigid, s
     for i in 0..count {
         let q = pose.apply(moving.points[i]);
         if let Some(j) = fixed.grid.nearest(q) {
-            sum += evidence(q, turn * moving.normals[i], fixed, j, s);
+            let e = evidence(q, turn * moving.normals[i], fixed, j, s);
+            sum += if e < 0.0 { s.violation * e } else { e };
         }
     }
     sum / count.max(1) as f64
@@ -80,7 +85,8 @@ pub(crate) fn both_ways(source: &View, target: &View, pose: &Rigid, count: usize
 
 /// The scale at which final poses are compared.
 pub(crate) const FINE: ScoreScale = ScoreScale {
-    inlier: 0.015,
+    inlier: 0.013,
     free: 0.03,
     cosine: 0.7,
+    violation: 1.75,
 };

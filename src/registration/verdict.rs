@@ -216,15 +216,7 @@ impl Search<'_> {
         let s = self.settings;
         let mut out: Vec<Candidate> = Vec::new();
         for (source, guesses) in self.sources.iter().zip(self.guesses) {
-            let fits = partial::partial(
-                source,
-                self.target,
-                guesses,
-                s.poses,
-                s.escalated_poses,
-                s.rival_share,
-                s.seed,
-            );
+            let fits = partial::partial(source, self.target, guesses, s.poses, s.escalated_poses, s.seed);
             out.extend(fits.into_iter().map(|fit| Candidate {
                 pose: fit.pose,
                 mirrored: source.mirrored,
@@ -327,8 +319,9 @@ impl Search<'_> {
                 if let Some(r) = rival.filter(|r| r.rms < s.rival_residual * best.rms.max(INDISTINCT)) {
                     let angle = r.pose.rotation_angle_deg(&best.pose);
                     let ratio = r.rms / best.rms.max(INDISTINCT);
+                    let lead = super::significance::lead(self.view(best.mirrored), self.target, &best.pose, &r.pose);
                     reasons.push(format!(
-                        "a pose {angle:.0} degrees away has only {ratio:.2} times the residual"
+                        "a pose {angle:.0} degrees away has only {ratio:.2} times the residual, {lead:.1} standard errors"
                     ));
                 }
                 if let Some(o) = other_hand
@@ -344,14 +337,14 @@ impl Search<'_> {
                 if best.score < s.weak_score {
                     reasons.push(format!("the surfaces hardly agree: score {:.2}", best.score));
                 }
-                if let Some(r) = rival.filter(|r| r.score > s.rival_share * best.score) {
+                if let Some(r) = rival.filter(|r| r.score > best.score - s.rival_margin) {
                     let angle = r.pose.rotation_angle_deg(&best.pose);
                     reasons.push(format!(
                         "a pose {angle:.0} degrees away scores {:.2} against {:.2}",
                         r.score, best.score
                     ));
                 }
-                if let Some(o) = other_hand.filter(|o| o.score > 0.9 * best.score) {
+                if let Some(o) = other_hand.filter(|o| o.score > best.score - s.rival_margin) {
                     reasons.push(format!(
                         "the other handedness scores {:.2} against {:.2}",
                         o.score, best.score
