@@ -1,7 +1,8 @@
 """Race of rigid registration methods on the same clouds: one bone sampled twice, cut, made noisy and turned.
 
     cargo run --release --example registration_table -- 50 dump FOLDER CASE...
-    python -m venv venv && venv/bin/pip install numpy scipy kiss-matcher addict
+    python -m venv venv && venv/bin/pip install numpy scipy kiss-matcher addict plotly dash \
+        scikit-learn pandas pyyaml tqdm matplotlib configargparse
     venv/bin/pip install --no-deps open3d-cpu==0.19.0          # 0.20.0 dies on import
     venv/bin/python compare/registration.py FOLDER [--voxel 0.02 0.03 0.04] [--methods fgr ransac pca kiss]
 

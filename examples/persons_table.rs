@@ -14,7 +14,9 @@ use datasets_synthetic::{bones as synthetic, rigid};
 use glam::{DMat3, DVec3};
 use medial_scaffold::geometry::{ClosestOnMesh, Rigid, TriangleMesh};
 use medial_scaffold::input::{Geometry, ReadSettings, Units, read_shape};
-use medial_scaffold::registration::{Mirror, Registration, RegistrationSettings, RegistrationShape, register};
+use medial_scaffold::registration::{
+    Mirror, Registration, RegistrationSettings, RegistrationShape, register,
+};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -46,7 +48,10 @@ fn main() {
         if names.is_empty() || names.iter().any(|n| *n == name) {
             let pairs = make(&data);
             if pairs.is_empty() {
-                println!("<!-- {name} skipped: no data in {} (set MEDIAL_DATA) -->", data.display());
+                println!(
+                    "<!-- {name} skipped: no data in {} (set MEDIAL_DATA) -->",
+                    data.display()
+                );
             } else {
                 let step = (pairs.len() / most.clamp(1, pairs.len())).max(1);
                 row(name, &pairs.iter().step_by(step).collect::<Vec<_>>());
@@ -298,7 +303,10 @@ fn wrists(data: &Path) -> Vec<Pair> {
     ] {
         let fine = read(&folder.join(format!("frameA/arm_r_{bone}.stl")), Units::M);
         for (side, flip) in [("rvs", false), ("lvs", true)] {
-            let coarse = read(&folder.join(format!("lowres_rvs_lvs/{bone}_{side}.stl")), Units::M);
+            let coarse = read(
+                &folder.join(format!("lowres_rvs_lvs/{bone}_{side}.stl")),
+                Units::M,
+            );
             if let (Some(target), Some(source)) = (fine.clone(), coarse) {
                 out.push(Pair {
                     name: format!("{bone} {side}"),

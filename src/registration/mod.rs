@@ -15,6 +15,7 @@
 //! | `surface` | whole shapes |
 //! | `partial`, `pairs` | partial shapes |
 //! | `score`, `refine`, `solve` | shared by both: free space, closest points, one linear step |
+//! | `significance` | whether one whole pose is better than another by more than the shapes differ |
 //! | `verdict` | which pose is reported and what is said of it |
 //! | [`difference`](mod@difference) | what is left between the shapes in that pose |
 //!

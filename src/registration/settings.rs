@@ -51,9 +51,12 @@ pub struct RegistrationSettings {
     /// A partial pose is ambiguous when a pose over 15 degrees away scores less than this below it. With 0.15 every pose in a
     /// wrong basin was flagged in 160 trials on bones, and 2 % of the right ones at half overlap, a third at 20 % overlap.
     pub rival_margin: f64,
-    /// A whole pose is ambiguous when a pose over 15 degrees away has a residual below this multiple of its own.
-    /// Easy bones have 5.5 to 7.6, the disc-like patella 1.08.
+    /// A whole pose may be ambiguous when a pose over 15 degrees away has a residual below this multiple of its own.
+    /// Easy bones of one person have 5.5 to 7.6, the disc-like patella 1.08, two persons' bones 1.0 to 2.
     pub rival_residual: f64,
+    /// ... and is, unless its lead over that pose is there over most of the surface: this many standard errors of the lead
+    /// from patch to patch. 2: one chance in 40.
+    pub rival_lead: f64,
     /// Poses kept in [`Registration::hypotheses`](super::Registration::hypotheses).
     pub hypotheses: usize,
     /// A direction slides when its stiffness is below this share of the stiffest one.
@@ -74,6 +77,7 @@ impl Default for RegistrationSettings {
             weak_score: 0.1,
             rival_margin: 0.15,
             rival_residual: 1.3,
+            rival_lead: 2.0,
             hypotheses: 6,
             sliding_share: 0.002,
             seed: 0,
@@ -132,6 +136,12 @@ impl RegistrationSettings {
             self.rival_residual,
             self.rival_residual >= 1.0,
             "at least 1",
+        )?;
+        check(
+            "rival_lead",
+            self.rival_lead,
+            self.rival_lead >= 0.0,
+            "at least 0",
         )?;
         check(
             "sliding_share",

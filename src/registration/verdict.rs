@@ -13,6 +13,7 @@ use super::result::{Conditioning, Hypothesis, Method, Registration};
 use super::score::{FINE, both_ways};
 use super::settings::{Extent, Mirror, RegistrationSettings};
 use super::shape::{RegistrationError, RegistrationShape};
+use super::significance::lead;
 use super::surface::{self, Distances};
 use crate::geometry::Rigid;
 use crate::matching::{MatchingSettings, pose_hypotheses};
@@ -319,10 +320,13 @@ impl Search<'_> {
                 if let Some(r) = rival.filter(|r| r.rms < s.rival_residual * best.rms.max(INDISTINCT)) {
                     let angle = r.pose.rotation_angle_deg(&best.pose);
                     let ratio = r.rms / best.rms.max(INDISTINCT);
-                    let lead = super::significance::lead(self.view(best.mirrored), self.target, &best.pose, &r.pose);
-                    reasons.push(format!(
-                        "a pose {angle:.0} degrees away has only {ratio:.2} times the residual, {lead:.1} standard errors"
-                    ));
+                    let lead = lead(self.view(best.mirrored), self.target, &best.pose, &r.pose);
+                    if lead < s.rival_lead || r.rms < s.rival_residual * INDISTINCT {
+                        reasons.push(format!(
+                            "a pose {angle:.0} degrees away has only {ratio:.2} times the residual, a lead of {lead:.1} standard \
+                             errors over the surface"
+                        ));
+                    }
                 }
                 if let Some(o) = other_hand
                     .filter(|o| o.rms.max(best.rms) < MIRROR_UNSURE * o.rms.min(best.rms).max(INDISTINCT))
