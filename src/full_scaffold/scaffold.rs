@@ -17,7 +17,6 @@ use super::spheres::{TetGeometry, tet_geometry};
 use crate::delaunay::door::Frame;
 use crate::delaunay::{DelaunayError, Facet, Triangulation};
 use crate::geometry::fixed::Grid;
-use crate::geometry::predicates::edge_gabriel_perturbed;
 use crate::geometry::{Sphere, TetId};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -227,7 +226,8 @@ pub fn full_scaffold(t: &Triangulation) -> Result<FullScaffold, DelaunayError> {
         return planar::flat_scaffold(t, &points);
     }
     let grid = Grid::new(points.iter().fold(0.0, |m, p| p.abs().max_element().max(m)));
-    let (spheres, signs): (Vec<Sphere>, Vec<u8>) = (0..t.num_finite() as u32)
+    let (mut spheres, mut signs): (Vec<Sphere>, Vec<Signs>) = (Vec::new(), Vec::new());
+    (0..t.num_finite() as u32)
         .into_par_iter()
         .map(|i| {
             let g: TetGeometry = tet_geometry(t, &points, grid, TetId(i));
@@ -235,130 +235,185 @@ pub fn full_scaffold(t: &Triangulation) -> Result<FullScaffold, DelaunayError> {
                 centre: g.sphere.centre.to_array().map(|v| frame.restore(v)).into(),
                 radius: frame.restore(g.sphere.radius),
             };
-            (sphere, g.outside | g.cospherical << 4)
+            let signs = Signs {
+                signs: g.outside | g.cospherical << 4,
+                obtuse: g.obtuse,
+            };
+            (sphere, signs)
         })
-        .unzip();
+        .unzip_into_vecs(&mut spheres, &mut signs);
+    tell_both_sides(t, &mut signs);
+    let mut flows = vec![0; signs.len()];
+    let mut counts = classify(t, &signs, &mut flows);
+    counts.generators = t.points.len() as u64;
+    // Edges come from Euler's formula; those without a sheet source are the ones that face an angle that is not acute.
+    let triangles = (t.num_finite() as u64 * 4 + (t.num_tets() - t.num_finite()) as u64) / 2;
+    let edges = counts.generators + triangles - t.num_finite() as u64 - 1;
+    counts.sheet_sources = edges - edges_facing_obtuse_angles(t, &signs);
+    counts.morse = counts.generators as i64 - counts.sheet_sources as i64 + counts.curve_sources as i64
+        - counts.sinks as i64;
     let mut out = FullScaffold {
         spheres,
-        counts: CriticalCounts::default(),
+        counts,
         degenerate: Vec::new(),
         planar: None,
-        signs,
-        flows: Vec::new(),
+        signs: signs.par_iter().map(|s| s.signs).collect(),
+        flows,
     };
-    let classified: Vec<FacetClasses> = (0..t.num_finite() as u32)
-        .into_par_iter()
-        .map(|i| classify(t, &points, &out, TetId(i)))
-        .collect();
-    out.counts = count(t, &out, &classified);
-    out.flows = classified.into_iter().map(|c| c.flows).collect();
     out.degenerate = degenerate_vertices(t, &out);
     Ok(out)
 }
 
-/// What step 2 finds for the facets a tetrahedron owns: those whose other side has a larger id.
+/// What step 1 finds for one tetrahedron.
 #[derive(Clone, Copy, Debug)]
-struct FacetClasses {
-    /// Flow, two bits a facet.
-    flows: u8,
-    /// For each facet, the place of the vertex with an angle that is not acute, or 4.
-    obtuse: [u8; 4],
+struct Signs {
+    /// As in [`FullScaffold::signs`].
+    signs: u8,
+    /// As in [`TetGeometry::obtuse`].
+    obtuse: u16,
 }
 
-fn classify(t: &Triangulation, points: &[DVec3], scaffold: &FullScaffold, tet: TetId) -> FacetClasses {
-    let mut out = FacetClasses {
-        flows: 0,
-        obtuse: [4; 4],
-    };
-    let v = t.tet(tet);
-    for index in 0..4u8 {
-        let facet = Facet { tet, index };
-        let other = t.mirror(facet);
-        if other < facet {
-            continue;
+/// Copies the bits of coinciding spheres from the owners of facets to the other sides. Few clouds have any.
+fn tell_both_sides(t: &Triangulation, signs: &mut [Signs]) {
+    let tied: Vec<u32> = signs
+        .par_iter()
+        .zip(0..signs.len() as u32)
+        .filter(|(s, _)| s.signs >> 4 != 0)
+        .map(|(_, i)| i)
+        .collect();
+    for tet in tied.into_iter().map(TetId) {
+        for index in (0..4u8)
+            .filter(|i| signs[tet.index()].signs >> (4 + i) & 1 == 1)
+            .collect::<Vec<_>>()
+        {
+            let other = t.mirror(Facet { tet, index });
+            signs[other.tet.index()].signs |= 16 << other.index;
         }
-        let corner = |k: u8| points[v[k as usize].index()];
-        let [x, y, z] = [(index + 1) & 3, (index + 2) & 3, (index + 3) & 3];
-        let obtuse_at = |k: u8, l: u8, m: u8| edge_gabriel_perturbed(corner(l), corner(m), corner(k)) < 0.0;
-        out.obtuse[index as usize] = if obtuse_at(x, y, z) {
-            x
-        } else if obtuse_at(y, z, x) {
-            y
-        } else if obtuse_at(z, x, y) {
-            z
-        } else {
-            4
-        };
-        let gabriel = scaffold.opposite_is_outside(facet) && scaffold.opposite_is_outside(other);
-        let acute = out.obtuse[index as usize] == 4;
-        let code = 2 * u8::from(!gabriel) + u8::from(!acute);
-        out.flows |= code << (2 * index);
     }
-    out
 }
 
-/// Step 3. Edges come from Euler's formula; those without a sheet source are the ones that face an angle that is not acute
-/// in some triangle (Delaunay edges need no other witness than their link), collected by smaller vertex and told apart.
-fn count(t: &Triangulation, scaffold: &FullScaffold, classified: &[FacetClasses]) -> CriticalCounts {
-    let n = t.points.len();
-    let mut counts = CriticalCounts {
-        generators: n as u64,
+/// Tetrahedra classified by one task at a time.
+const CHUNK: usize = 1 << 14;
+
+/// Step 2: flow of the facets each tetrahedron owns, and the numbers of critical points seen on the way. Without branches:
+/// flows are as good as random.
+fn classify(t: &Triangulation, signs: &[Signs], flows: &mut [u8]) -> CriticalCounts {
+    let parts = flows.par_chunks_mut(CHUNK).enumerate().map(|(chunk, flows)| {
+        let [mut sinks, mut sources, mut relays] = [0u64; 3];
+        for (i, flow) in flows.iter_mut().enumerate() {
+            let i = chunk * CHUNK + i;
+            let own = signs[i];
+            sinks += u64::from(own.signs & 15 == 15);
+            for index in 0..4u8 {
+                let facet = Facet {
+                    tet: TetId(i as u32),
+                    index,
+                };
+                let other = t.mirror(facet);
+                let owned = u8::from(facet < other);
+                let other_outside = signs
+                    .get(other.tet.index())
+                    .map_or(1, |s| s.signs >> other.index & 1);
+                let gabriel = own.signs >> index & other_outside & 1;
+                let obtuse = u8::from(own.obtuse >> (4 * index) & 15 != 0);
+                *flow |= (owned * (2 * (1 - gabriel) + obtuse)) << (2 * index);
+                sources += u64::from(owned & gabriel & (1 - obtuse));
+                relays += u64::from(owned & gabriel & obtuse);
+            }
+        }
+        [sinks, sources, relays]
+    });
+    let [sinks, curve_sources, relays] = parts.reduce(|| [0; 3], |a, b| std::array::from_fn(|k| a[k] + b[k]));
+    CriticalCounts {
+        sinks,
+        curve_sources,
+        relays,
         ..CriticalCounts::default()
-    };
-    let mut triangles = 0u64;
-    let mut starts = vec![0u32; n + 1];
-    let facing = |tet: TetId, index: usize, at: u8| {
-        let v = t.tet(tet);
-        let mut edge = (0..4).filter(|&k| k != index && k != at as usize).map(|k| v[k].0);
-        let (a, b) = (edge.next().unwrap_or(0), edge.next().unwrap_or(0));
-        (a.min(b), a.max(b))
-    };
-    for tet in t.finite_tets() {
-        let class = &classified[tet.index()];
-        counts.sinks += u64::from(scaffold.is_sink(tet));
-        for index in 0..4 {
-            let facet = Facet {
-                tet,
-                index: index as u8,
-            };
-            if t.mirror(facet) < facet {
-                continue;
-            }
-            triangles += 1;
-            match class.flows >> (2 * index) & 3 {
-                0 => counts.curve_sources += 1,
-                1 => counts.relays += 1,
-                _ => {}
-            }
-            if class.obtuse[index] < 4 {
-                starts[facing(tet, index, class.obtuse[index]).0 as usize + 1] += 1;
-            }
-        }
     }
-    for i in 0..n {
-        starts[i + 1] += starts[i];
-    }
-    let mut ends = vec![0u32; starts[n] as usize];
-    let mut fill = starts.clone();
-    for tet in t.finite_tets() {
-        let class = &classified[tet.index()];
-        for index in 0..4 {
-            if class.obtuse[index] < 4 {
-                let (a, b) = facing(tet, index, class.obtuse[index]);
-                ends[fill[a as usize] as usize] = b;
-                fill[a as usize] += 1;
-            }
-        }
-    }
-    let mut crossed = 0u64;
-    for i in 0..n {
-        let run = &mut ends[starts[i] as usize..starts[i + 1] as usize];
-        run.sort_unstable();
-        crossed += run.chunk_by(|a, b| a == b).count() as u64;
-    }
-    let edges = n as u64 + triangles - t.num_finite() as u64 - 1;
-    counts.sheet_sources = edges - crossed;
-    counts.morse = counts.generators as i64 - counts.sheet_sources as i64 + counts.curve_sources as i64
-        - counts.sinks as i64;
-    counts
 }
+
+/// Step 3: the number of edges that face an angle that is not acute in some triangle. Such an edge has no sheet source, and
+/// Delaunay edges need no other witness than their link. Edges are collected by their smaller vertex and told apart.
+fn edges_facing_obtuse_angles(t: &Triangulation, signs: &[Signs]) -> u64 {
+    let n = t.points.len();
+    let facing = |tet: usize, index: usize, at: u16| {
+        let v = t.tet(TetId(tet as u32));
+        let [p, q] = OPPOSITE[index][(at & 3) as usize];
+        let (a, b) = (v[p as usize].0, v[q as usize].0);
+        (a.min(b) as usize, a.max(b))
+    };
+    let mut starts = vec![0u32; n + 1];
+    for (tet, s) in signs.iter().enumerate() {
+        for index in 0..4 {
+            let code = s.obtuse >> (4 * index) & 15;
+            // The edge of another angle counts nothing.
+            let (a, _) = facing(tet, index, code.wrapping_sub(1));
+            starts[a] += u32::from(code != 0);
+        }
+    }
+    let mut sum = 0;
+    for start in &mut starts {
+        (*start, sum) = (sum, sum + *start);
+    }
+    let mut ends = vec![0u32; sum as usize];
+    for (tet, s) in signs.iter().enumerate() {
+        let mut rest = s.obtuse;
+        while rest != 0 {
+            let index = rest.trailing_zeros() as usize / 4;
+            let code = rest >> (4 * index) & 15;
+            rest &= !(15 << (4 * index));
+            let (a, b) = facing(tet, index, code - 1);
+            ends[starts[a] as usize] = b;
+            starts[a] += 1;
+        }
+    }
+    // Each start has moved to the next one's old place.
+    (0..n)
+        .into_par_iter()
+        .with_min_len(CHUNK)
+        .map_init(Vec::new, |copy, i| {
+            let from = if i == 0 { 0 } else { starts[i - 1] };
+            distinct(&ends[from as usize..starts[i] as usize], copy)
+        })
+        .sum()
+}
+
+/// Number of different values; `copy` is a buffer.
+#[inline(always)]
+fn distinct(values: &[u32], copy: &mut Vec<u32>) -> u64 {
+    if values.len() <= 24 {
+        let repeats = |i: usize| {
+            values[..i]
+                .iter()
+                .fold(false, |found, v| found | (*v == values[i]))
+        };
+        return (0..values.len()).map(|i| u64::from(!repeats(i))).sum();
+    }
+    copy.clear();
+    copy.extend_from_slice(values);
+    copy.sort_unstable();
+    copy.chunk_by(|a, b| a == b).count() as u64
+}
+
+/// Places of the edge that faces a vertex in a facet, for each facet and place; nothing where the two are the same.
+const OPPOSITE: [[[u8; 2]; 4]; 4] = {
+    let mut table = [[[0; 2]; 4]; 4];
+    let mut facet = 0;
+    while facet < 4 {
+        let mut at = 0;
+        while at < 4 {
+            let mut k = 0;
+            let mut place = 0;
+            while place < 4 && facet != at {
+                if place != facet && place != at {
+                    table[facet][at][k] = place as u8;
+                    k += 1;
+                }
+                place += 1;
+            }
+            at += 1;
+        }
+        facet += 1;
+    }
+    table
+};
