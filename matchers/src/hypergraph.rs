@@ -256,7 +256,7 @@ impl AttributedHypergraph {
         Ok(NodeId::from_index(index))
     }
 
-    /// Adds a curve whose contraction costs its weight.
+    /// Adds a curve that cannot be contracted; see [`Self::set_contract_price`].
     ///
     /// # Errors
     /// When the weight or an attribute is refused, or an end node does not exist.
@@ -275,7 +275,7 @@ impl AttributedHypergraph {
         self.curves.push(Curve {
             ends,
             weight,
-            contract_price: Some(weight),
+            contract_price: None,
             attributes,
         });
         Ok(CurveId::from_index(index))

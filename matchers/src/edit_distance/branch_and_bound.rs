@@ -39,8 +39,8 @@ const BRANCHED: [usize; 2] = [0, 2];
 const ASCENT_ORDER: [usize; 3] = [1, 0, 2];
 
 /// Most rounds of the dual ascent at the root and at every other search node.
-const ROOT_ROUNDS: usize = 60;
-const NODE_ROUNDS: usize = 2;
+pub(super) const ROOT_ROUNDS: usize = 60;
+pub(super) const NODE_ROUNDS: usize = 2;
 
 /// A round that closes less than this fraction of the gap ends the ascent.
 const SETTLED: f64 = 0.02;
@@ -101,42 +101,45 @@ pub fn search(problem: &MatchingProblem, start: &ElementMap, max_search_nodes: u
     }
 }
 
-struct Search<'a> {
-    objective: HypergraphObjective<'a>,
-    couplings: Couplings,
+pub(super) struct Search<'a> {
+    pub(super) objective: HypergraphObjective<'a>,
+    pub(super) couplings: Couplings,
     /// Decided pairs and their gradient.
-    state: Discrete,
+    pub(super) state: Discrete,
     /// Whether an element is still undecided, for targets and sources of every kind.
-    open_target: [Vec<bool>; 3],
-    open_source: [Vec<bool>; 3],
+    pub(super) open_target: [Vec<bool>; 3],
+    pub(super) open_source: [Vec<bool>; 3],
     best: Vec<Vec<Option<usize>>>,
     best_gain: f64,
     /// Largest bound among branches that the limit left open.
     open_gain: f64,
-    tolerance: f64,
+    pub(super) tolerance: f64,
     visited: usize,
     limit: usize,
 }
 
 /// An upper bound of the gain, with what is needed to branch.
-struct Bound {
-    gain: f64,
+pub(super) struct Bound {
+    pub(super) gain: f64,
     /// Undecided target element with the fewest open choices, and the choices, best first.
-    branch: Option<Branch>,
+    pub(super) branch: Option<Branch>,
     /// The curves' assignment: optimal once nodes and sheets are decided.
     curves: Vec<Option<usize>>,
-    shares: Shares,
+    pub(super) shares: Shares,
+    /// What every undecided element of target and source contributes to the bound, by kind; none when the bound does not
+    /// beat what was asked.
+    pub(super) worth: Option<[[Vec<f64>; 3]; 2]>,
 }
 
-struct Branch {
-    kind: usize,
-    row: usize,
+pub(super) struct Branch {
+    pub(super) kind: usize,
+    pub(super) row: usize,
     /// Column or unmatched, with an upper bound of the gain of that child.
-    choices: Vec<(f64, Option<usize>)>,
+    pub(super) choices: Vec<(f64, Option<usize>)>,
 }
 
 impl<'a> Search<'a> {
-    fn new(problem: &'a MatchingProblem, best_gain: f64, limit: usize) -> Self {
+    pub(super) fn new(problem: &'a MatchingProblem, best_gain: f64, limit: usize) -> Self {
         let objective = HypergraphObjective::new(problem);
         let state = Discrete::empty(&objective);
         Self {
@@ -203,7 +206,7 @@ impl<'a> Search<'a> {
     }
 
     /// The bound at the current decisions, with better shares; a branch is only prepared when the bound beats `to_beat`.
-    fn bound(&self, shares: &Shares, rounds: usize, to_beat: f64) -> Bound {
+    pub(super) fn bound(&self, shares: &Shares, rounds: usize, to_beat: f64) -> Bound {
         let open = Open::new(&self.open_target, &self.open_source);
         let mut shares = shares.clone();
         let beaten = |gain: f64| gain <= to_beat + self.tolerance;
@@ -237,6 +240,7 @@ impl<'a> Search<'a> {
                 branch: None,
                 curves: Vec::new(),
                 shares,
+                worth: None,
             };
         }
         // A kind that took shares has larger leaders than it was solved with; the slacks need the present ones.
@@ -252,12 +256,30 @@ impl<'a> Search<'a> {
         } else {
             Vec::new()
         };
+        let worth = self.worth(&open, &parts);
         Bound {
             gain,
             branch,
             curves,
             shares,
+            worth: Some(worth),
         }
+    }
+
+    /// What the undecided elements contribute to the bound. Optimal duals are not unique; the mean of those that favour the
+    /// target and those that favour the source is fair to both.
+    fn worth(&self, open: &Open, parts: &[KindBound]) -> [[Vec<f64>; 3]; 2] {
+        let mut worth = [&self.open_target, &self.open_source].map(|o| [0, 1, 2].map(|k| vec![0.0; o[k].len()]));
+        for (k, part) in parts.iter().enumerate() {
+            let turned = part.turned();
+            for (r, &x) in open.rows[k].iter().enumerate() {
+                worth[0][k][x] = 0.5 * (part.row_duals[r] + turned.col_duals[r]).max(0.0);
+            }
+            for (c, &y) in open.cols[k].iter().enumerate() {
+                worth[1][k][y] = 0.5 * (part.col_duals[c] + turned.row_duals[c]).max(0.0);
+            }
+        }
+        worth
     }
 
     /// The undecided node or sheet with the fewest choices that still beat `to_beat`.

@@ -12,12 +12,22 @@ use serde::{Deserialize, Serialize};
 pub trait GroupCosts {
     /// Cost of deforming the target group into the source group; parts heaviest first, never empty; `+inf` forbids.
     fn cost(&self, kind: Kind, target: &[u32], source: &[u32]) -> f64;
+
+    /// A cost that no two groups with these heaviest parts undercut. What is known helps the proof; the difference of the weights
+    /// is taken into account anyway.
+    fn at_least(&self, _kind: Kind, _target: u32, _source: u32) -> f64 {
+        0.0
+    }
 }
 
 /// A healed element is compared by its heaviest part.
 impl GroupCosts for ElementCosts {
     fn cost(&self, kind: Kind, target: &[u32], source: &[u32]) -> f64 {
         self.of(kind)[(target[0] as usize, source[0] as usize)]
+    }
+
+    fn at_least(&self, kind: Kind, target: u32, source: u32) -> f64 {
+        self.of(kind)[(target as usize, source as usize)]
     }
 }
 
@@ -41,6 +51,20 @@ impl GroupCosts for CanonicalCosts<'_> {
             kind,
             &old(&self.canonical.target_order, target),
             &old(&self.canonical.source_order, source),
+        )
+    }
+
+    fn at_least(&self, kind: Kind, target: u32, source: u32) -> f64 {
+        let (target, source) = if self.canonical.exchanged {
+            (source, target)
+        } else {
+            (target, source)
+        };
+        let old = |order: &[Vec<u32>; 3], x: u32| order[kind.index()][x as usize];
+        self.costs.at_least(
+            kind,
+            old(&self.canonical.target_order, target),
+            old(&self.canonical.source_order, source),
         )
     }
 }
@@ -143,5 +167,17 @@ impl GroupCosts for AttributeCosts<'_> {
             })
             .sum();
         difference.max((weight(self.target, target[0]) - weight(self.source, source[0])).abs())
+    }
+
+    /// Attributes of the heaviest part stay what they are; sums and maxima may come out equal.
+    fn at_least(&self, kind: Kind, target: u32, source: u32) -> f64 {
+        let rules = self.rules.of(kind).iter().zip(self.scales.of(kind)).enumerate();
+        rules
+            .filter(|(_, (rule, _))| **rule == MergeRule::Heaviest)
+            .map(|(k, (_, s))| {
+                let a = self.target.attributes(kind, target as usize)[k];
+                s * (a - self.source.attributes(kind, source as usize)[k]).abs()
+            })
+            .sum()
     }
 }

@@ -9,8 +9,9 @@
 //! * **contract** a curve: its two end nodes become one node; costs the curve's contract price, everything included, so that
 //!   a curve of no length costs nothing;
 //! * **merge at a node**: two curves that end there become one curve; costs what splicing the node costs, its weight and the
-//!   strengths of its incidences;
-//! * **merge at a curve**: two sheets that it bounds become one sheet; costs what splicing the curve costs.
+//!   strengths of its incidences; all other curves that end there must go (**cleared**: spliced, or removed by another heal);
+//! * **merge at a curve**: two sheets that it bounds become one sheet; costs what splicing the curve costs; all other sheets
+//!   that it bounds must go.
 //!
 //! This is what a transition of a medial scaffold does around the element it removes: splicing a fin leaves its host rib in
 //! two halves, which then are one rib. The healed element weighs as much as its heaviest part. (Chang & Kimia, "Regularizing
@@ -18,14 +19,14 @@
 //! use deform, splice, contract and merge as edit operations of shock graphs.)
 //!
 //! Every element is removed or joined consistently: an element that is removed is not part of a healed one, no element is
-//! removed twice, and a heal must join two things that are not one already.
+//! removed twice, an element that is cleared is not part of a healed one, and a heal must join two things that are not one already.
 
 use crate::hypergraph::{AttributedHypergraph, CurveEnds, CurveId, Kind, NodeId, SheetId};
 use crate::matching_problem::Side;
 use serde::{Deserialize, Serialize};
 
 /// Removal of one element that heals two others into one.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Heal {
     /// Kind of the element that goes.
     pub removed_kind: Kind,
@@ -35,6 +36,8 @@ pub struct Heal {
     pub joined_kind: Kind,
     /// The two elements that become one, ascending.
     pub joined: [u32; 2],
+    /// Elements of the same kind that also meet the removed one and must go, ascending; none for a contraction.
+    pub cleared: Vec<u32>,
     /// Price: the contract price, or that of splicing the element with all its incidences.
     pub price: f64,
 }
@@ -53,6 +56,8 @@ pub struct Healed {
     pub graph: AttributedHypergraph,
     /// Original elements of every element, heaviest first, for nodes, curves, sheets.
     pub parts: [Vec<Vec<u32>>; 3],
+    /// Elements that must be spliced, because a heal clears them, for nodes, curves, sheets.
+    pub cleared: [Vec<bool>; 3],
     /// Sum of the prices of the heals.
     pub price: f64,
 }
@@ -68,7 +73,7 @@ pub fn candidates(g: &AttributedHypergraph, side: &Side, contract: bool, merge: 
             if let (CurveEnds::Two(a, b), Some(price)) = (curve.ends, curve.contract_price)
                 && a != b
             {
-                heals.push(heal(Kind::Curve, c, Kind::Node, a.0, b.0, price));
+                heals.push(heal(Kind::Curve, c, Kind::Node, [a.0, b.0], &[], price));
             }
         }
     }
@@ -83,31 +88,39 @@ pub fn candidates(g: &AttributedHypergraph, side: &Side, contract: bool, merge: 
     heals
 }
 
-fn heal(removed_kind: Kind, removed: usize, joined_kind: Kind, a: u32, b: u32, price: f64) -> Heal {
+/// `meeting` are all elements of the joined kind that meet the removed one.
+fn heal(
+    removed_kind: Kind,
+    removed: usize,
+    joined_kind: Kind,
+    [a, b]: [u32; 2],
+    meeting: &[u32],
+    price: f64,
+) -> Heal {
+    let mut cleared: Vec<u32> = meeting.iter().copied().filter(|&m| m != a && m != b).collect();
+    cleared.sort_unstable();
+    cleared.dedup();
     Heal {
         removed_kind,
         removed: removed as u32,
         joined_kind,
         joined: [a.min(b), a.max(b)],
+        cleared,
         price,
     }
 }
 
 fn merges_at_nodes(g: &AttributedHypergraph, side: &Side, heals: &mut Vec<Heal>) {
-    let mut ending = vec![Vec::new(); g.nodes().len()];
-    for (c, curve) in g.curves().iter().enumerate() {
-        let mut ends: Vec<NodeId> = curve.ends.nodes().collect();
-        if ends.len() == 2 && ends[0] == ends[1] {
-            ends.clear(); // a loop's own ends heal by removing the node alone
-        }
-        ends.iter().for_each(|n| ending[n.index()].push(c as u32));
-    }
-    for (n, curves) in ending.iter().enumerate() {
+    for n in 0..g.nodes().len() {
         let price = g.nodes()[n].weight + incident_strength(side, 0, n);
-        for (k, &c) in curves.iter().enumerate() {
-            curves[..k]
+        let meeting: Vec<u32> = side.incidences[0].forward[n].iter().map(|i| i.element).collect();
+        // A loop's own ends heal by removing the node alone.
+        let is_loop = |c: &u32| matches!(g.curves()[*c as usize].ends, CurveEnds::Two(a, b) if a == b);
+        let open: Vec<u32> = meeting.iter().copied().filter(|c| !is_loop(c)).collect();
+        for (k, &c) in open.iter().enumerate() {
+            open[..k]
                 .iter()
-                .for_each(|&d| heals.push(heal(Kind::Node, n, Kind::Curve, c, d, price)));
+                .for_each(|&d| heals.push(heal(Kind::Node, n, Kind::Curve, [c, d], &meeting, price)));
         }
     }
 }
@@ -119,7 +132,7 @@ fn merges_at_curves(g: &AttributedHypergraph, side: &Side, heals: &mut Vec<Heal>
         for (k, &s) in sheets.iter().enumerate() {
             sheets[..k]
                 .iter()
-                .for_each(|&t| heals.push(heal(Kind::Curve, c, Kind::Sheet, s, t, price)));
+                .for_each(|&t| heals.push(heal(Kind::Curve, c, Kind::Sheet, [s, t], &sheets, price)));
         }
     }
 }
@@ -162,6 +175,16 @@ pub fn apply(g: &AttributedHypergraph, heals: &[Heal]) -> Option<Healed> {
             .any(|&x| removed[h.joined_kind.index()][x as usize])
     };
     if heals.iter().any(joined) {
+        return None;
+    }
+    let mut part = Kind::ALL.map(|k| vec![false; g.count(k)]);
+    for h in heals {
+        h.joined
+            .iter()
+            .for_each(|&x| part[h.joined_kind.index()][x as usize] = true);
+    }
+    let kept = |h: &Heal| h.cleared.iter().any(|&x| part[h.joined_kind.index()][x as usize]);
+    if heals.iter().any(kept) {
         return None;
     }
     Some(rebuild(g, heals, &removed, &mut leader))
@@ -207,9 +230,16 @@ fn rebuild(
         }
     }
     let graph = rebuilt_graph(g, heals, &weights, &parts, &place);
+    let mut cleared = [0, 1, 2].map(|k| vec![false; parts[k].len()]);
+    for h in heals {
+        let k = h.joined_kind.index();
+        let still_there = h.cleared.iter().filter_map(|&x| place[k][x as usize]);
+        still_there.for_each(|at| cleared[k][at as usize] = true);
+    }
     Healed {
         graph,
         parts,
+        cleared,
         price: heals.iter().map(|h| h.price).sum(),
     }
 }

@@ -15,16 +15,18 @@
 //! * [`shares`]: the bound, made tight by dual ascent
 //! * [`branch_and_bound`]: exact search, for fixed graphs
 //! * [`healing`]: contract and merge
-//! * [`relaxation`]: a lower bound that holds for all heals
+//! * `optimism`: what a graph may at best become by heals
+//! * `healed_search`: exact search over maps and heals together
 //! * [`operations`]: the edit path
 //! * [`distance`]: the front door
 
 pub mod branch_and_bound;
 pub mod costs;
 pub mod distance;
+mod healed_search;
 pub mod healing;
 pub mod operations;
-pub mod relaxation;
+mod optimism;
 pub mod shares;
 
 pub use costs::{AttributeCosts, GroupCosts, MergeRule, MergeRules};

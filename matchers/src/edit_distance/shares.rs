@@ -53,6 +53,25 @@ pub struct Couplings {
 #[derive(Debug, Clone)]
 pub struct Shares([Table; 3]);
 
+impl Shares {
+    /// The shares of couplings whose gains have changed: every one keeps its part of the gain.
+    pub(super) fn rescaled(&self, before: &Couplings, after: &Couplings) -> Self {
+        Self([0, 1, 2].map(|pair| {
+            let (old, new) = (&before.gains[pair], &after.gains[pair]);
+            Table::from_fn(new.rows(), new.cols(), |e, f| {
+                let (k, k_new) = (old[(e, f)], new[(e, f)]);
+                if k == k_new {
+                    self.0[pair][(e, f)]
+                } else if k > 0.0 {
+                    self.0[pair][(e, f)] * k_new / k
+                } else {
+                    0.5 * k_new
+                }
+            })
+        }))
+    }
+}
+
 /// Undecided elements of both sides, by kind.
 #[derive(Debug, Clone)]
 pub struct Open {
@@ -107,6 +126,24 @@ impl KindBound {
     /// The kind's part of the bound.
     pub fn value(&self) -> f64 {
         self.row_duals.iter().sum::<f64>() + self.col_duals.iter().sum::<f64>()
+    }
+
+    /// The same with rows and columns exchanged: as large, with other duals.
+    pub(super) fn turned(&self) -> Self {
+        Self::of(self.leaders.transposed())
+    }
+
+    /// Solves the LSAP of the leaders, unmatched at zero.
+    fn of(leaders: Table) -> Self {
+        let floored = Table::from_fn(leaders.rows(), leaders.cols(), |r, c| leaders[(r, c)].max(0.0));
+        let lsap = assignment::solve_max(&floored).expect("entries are finite and at least 0");
+        let mut bound = Self {
+            leaders,
+            row_duals: lsap.row_duals.iter().map(|u| -u).collect(),
+            col_duals: lsap.col_duals.iter().map(|v| -v).collect(),
+        };
+        make_duals_positive(&mut bound);
+        bound
     }
 
     /// How much the bound falls when a pair is forced.
@@ -164,14 +201,7 @@ impl Couplings {
             }
             sum
         });
-        let floored = Table::from_fn(rows.len(), cols.len(), |r, c| leaders[(r, c)].max(0.0));
-        let lsap = assignment::solve_max(&floored).expect("entries are finite and at least 0");
-        let mut bound = KindBound {
-            leaders,
-            row_duals: lsap.row_duals.iter().map(|u| -u).collect(),
-            col_duals: lsap.col_duals.iter().map(|v| -v).collect(),
-        };
-        make_duals_positive(&mut bound);
+        let bound = KindBound::of(leaders);
         if improve {
             self.take_shares(kind, open, shares, &bound, &mut small);
         }

@@ -1,8 +1,10 @@
 //! Random hypergraphs shared by the tests.
 #![allow(dead_code)] // each test file uses its part
 
+use matchers::edit_distance::Heal;
+use matchers::edit_distance::healing::{apply, candidates, unhealed};
 use matchers::hypergraph::Kind;
-use matchers::matching_problem::AttributeScales;
+use matchers::matching_problem::{AttributeScales, Side};
 use matchers::{
     AttributedHypergraph, CurveEnds, CurveId, ElementCosts, EvidenceSettings, MatchingProblem, NodeId,
     SheetId,
@@ -46,7 +48,10 @@ pub fn random_hypergraph(
             CurveEnds::Two(end(rng), end(rng))
         };
         let attributes = vec![rng.random_range(2.0..20.0), rng.random_range(0.0..3.0)];
-        g.add_curve(ends, rng.random_range(0.2..3.0), attributes).unwrap();
+        // Its two ends must come together; one curve in seven is short.
+        let price = attributes[0] * if rng.random::<f64>() < 0.15 { 0.1 } else { 1.0 };
+        let c = g.add_curve(ends, rng.random_range(0.2..3.0), attributes).unwrap();
+        g.set_contract_price(c, Some(price)).unwrap();
     }
     for _ in 0..sheets {
         let boundary = 0..rng.random_range(0..4).min(curves);
@@ -122,4 +127,72 @@ pub fn permuted(g: &AttributedHypergraph, rng: &mut ChaCha8Rng) -> (AttributedHy
         .unwrap();
     }
     (h, places)
+}
+
+/// The hypergraph after a few heals and splices, with weights and attributes that differ by some `jitter`.
+pub fn edited(
+    g: &AttributedHypergraph,
+    rng: &mut ChaCha8Rng,
+    (heals, splices, jitter): (usize, usize, f64),
+) -> AttributedHypergraph {
+    let side = Side::new(g, &EvidenceSettings::default());
+    let all = candidates(g, &side, true, true);
+    let mut chosen: Vec<Heal> = Vec::new();
+    let mut healed = unhealed(g);
+    for _ in 0..if all.is_empty() { 0 } else { heals } {
+        chosen.push(all[rng.random_range(0..all.len())].clone());
+        match apply(g, &chosen) {
+            Some(more) => healed = more,
+            None => {
+                chosen.pop();
+            }
+        }
+    }
+    let h = &healed.graph;
+    let mut gone = Kind::ALL.map(|k| vec![false; h.count(k)]);
+    for _ in 0..splices {
+        let kind = Kind::ALL[rng.random_range(0..3)];
+        if h.count(kind) > 0 {
+            gone[kind.index()][rng.random_range(0..h.count(kind))] = true;
+        }
+    }
+    let mut place = Kind::ALL.map(|k| vec![None; h.count(k)]);
+    let mut other = |value: f64| value * (1.0 + jitter * rng.random_range(-1.0..1.0));
+    let mut attributes = |kind: Kind, x: usize| -> Vec<f64> {
+        let first = healed.parts[kind.index()][x][0] as usize;
+        g.attributes(kind, first).iter().map(|&a| other(a)).collect()
+    };
+    let mut out = AttributedHypergraph::new();
+    for (x, node) in h.nodes().iter().enumerate().filter(|(x, _)| !gone[0][*x]) {
+        let list = attributes(Kind::Node, x);
+        place[0][x] = Some(out.add_node(node.weight, list).unwrap().0);
+    }
+    for (x, curve) in h.curves().iter().enumerate().filter(|(x, _)| !gone[1][*x]) {
+        let ends: Vec<NodeId> = curve
+            .ends
+            .nodes()
+            .filter_map(|n| place[0][n.index()].map(NodeId))
+            .collect();
+        let ends = match ends[..] {
+            [] => CurveEnds::Closed,
+            [a] => CurveEnds::One(a),
+            [a, b, ..] => CurveEnds::Two(a, b),
+        };
+        let list = attributes(Kind::Curve, x);
+        let id = out.add_curve(ends, curve.weight, list).unwrap();
+        out.set_contract_price(id, curve.contract_price).unwrap();
+        place[1][x] = Some(id.0);
+    }
+    for (x, sheet) in h.sheets().iter().enumerate().filter(|(x, _)| !gone[2][*x]) {
+        let curves = sheet.curves.iter().filter_map(|c| place[1][c.index()].map(CurveId));
+        let list = attributes(Kind::Sheet, x);
+        let id = out.add_sheet(curves.collect(), sheet.weight, list).unwrap();
+        place[2][x] = Some(id.0);
+    }
+    for c in h.corners() {
+        if let (Some(s), Some(n)) = (place[2][c.sheet.index()], place[0][c.node.index()]) {
+            out.add_corner(SheetId(s), NodeId(n), c.turn).unwrap();
+        }
+    }
+    out
 }
