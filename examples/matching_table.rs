@@ -1,16 +1,23 @@
 //! Prints what the scaffolds alone say of real bones: how often they give the pose, and whose bone is nearest to whose.
 //!
-//! `cargo run --release --example matching_table -- [BONES] [pose] [identity]` with the bones of `../shared/data` (or of the folder
+//! `cargo run --release --example matching_table -- [BONES] [pose] [identity] [carpals] [population]` with the bones of `../shared/data` (or of the folder
 //! in `MEDIAL_DATA`). `pose`: every bone against itself, sampled again (other seed, four times the points, noise of half the
-//! spacing), in a random pose. `identity`: right bones of one person against the mirrored left ones.
+//! spacing), in a random pose. `identity`: right tarsals of one person
+//! against the mirrored left ones. `carpals`: the same for a wrist, and two persons' wrists. `population`: four (or BONES)
+//! individuals of eight synthetic carpal-like bones, whose correspondences are known.
 
+use datasets_synthetic::{Warp, bones as synthetic, population as synthetic_population};
 use glam::{DMat3, DQuat, DVec3};
-use medial_scaffold::coarse_scaffold::{CoarseScaffold, CoarseScaffoldSettings, coarse_scaffold};
+use medial_scaffold::coarse_scaffold::{
+    CoarseScaffold, CoarseScaffoldSettings, Curve, CurveKind, Sheet, coarse_scaffold,
+};
 use medial_scaffold::fine_scaffold::{FineScaffoldSettings, fine_scaffold};
 use medial_scaffold::geometry::{Length, Rigid, TriangleMesh};
 use medial_scaffold::input::sampling::{SamplingSettings, sample};
 use medial_scaffold::input::{Geometry, ReadSettings, Shape, Units, read_shape};
-use medial_scaffold::matching::{MatchingSettings, match_scaffolds, match_scaffolds_at};
+use medial_scaffold::matching::{
+    Matching, MatchingSettings, ShapeDistance, match_scaffolds, match_scaffolds_at,
+};
 use medial_scaffold::registration::{RegistrationSettings, RegistrationShape, register};
 use medial_scaffold::regularise::{RegulariseSettings, regularise};
 use medial_scaffold::segregation::{KnownSurfaceSettings, segregate_known_refined};
@@ -37,6 +44,9 @@ fn main() {
     let carpals = bones(&data.join("carpal_myosim_apache2/frameA"), Units::M);
     let right = bones(&data.join("tarsal_visiblehuman_ccby4/VHF_Right"), Units::Mm);
     let left = bones(&data.join("tarsal_visiblehuman_ccby4/VHF_Left"), Units::Mm);
+    if chosen("population") {
+        population(most.min(4) as u64);
+    }
     if right.is_empty() || carpals.is_empty() {
         println!("skipped: no bones in {} (set MEDIAL_DATA)", data.display());
         return;
@@ -46,7 +56,32 @@ fn main() {
         poses(&all);
     }
     if chosen("identity") {
-        identity(&right, &left, most);
+        let (r, l) = (named(&right, most), named(&left, most));
+        identity("Tarsals of one person, right and mirrored left", &r, &l, true);
+    }
+    if chosen("carpals") {
+        let folder = data.join("carpal_myosim_apache2/lowres_rvs_lvs");
+        let (one_side, other_side): (Vec<Bone>, Vec<Bone>) = bones(&folder, Units::M)
+            .into_iter()
+            .partition(|b| b.name.ends_with("rvs"));
+        let (first, r, l) = (
+            named(&carpals, most),
+            named(&one_side, most),
+            named(&other_side, most),
+        );
+        identity(
+            "Carpals of one person, right and mirrored left, 34 to 90 points each",
+            &r,
+            &l,
+            true,
+        );
+        identity("Carpals of two persons, right", &first, &r, false);
+        identity(
+            "Carpals of two persons, right and mirrored left",
+            &first,
+            &l,
+            true,
+        );
     }
 }
 
@@ -118,52 +153,295 @@ fn poses(bones: &[&Bone]) {
     }
 }
 
-fn identity(right: &[Bone], left: &[Bone], most: usize) {
-    let make = |bones: &[Bone]| -> Vec<(String, CoarseScaffold)> {
-        let named = |b: &Bone| {
-            Some((
-                b.name.replace("Left", "").replace("Right", ""),
-                scaffold(&b.mesh, 10_000, 1, 0.0)?,
-            ))
-        };
-        bones.iter().take(most).filter_map(named).collect()
+/// Bones by name with their scaffolds.
+type Named = Vec<(String, CoarseScaffold)>;
+
+fn named(bones: &[Bone], most: usize) -> Named {
+    let short = |name: &str| {
+        [
+            "arm_r_",
+            "_rvs",
+            "_lvs",
+            "VHF_Right_Bone_",
+            "VHF_Left_Bone_",
+            "_smooth",
+        ]
+        .iter()
+        .fold(name.to_owned(), |n, part| n.replace(part, ""))
     };
-    let (right, left) = (make(right), make(left));
+    let all: Vec<&Bone> = bones.iter().take(most).collect();
+    all.iter()
+        .filter_map(|b| Some((short(&b.name), scaffold(&b.mesh, 10_000, 1, 0.0)?)))
+        .collect()
+}
+
+/// The ways to say how far apart two bones are.
+const MEASURES: [&str; 6] = [
+    "aligned, with size",
+    "aligned, without",
+    "distributions, with",
+    "distributions, without",
+    "structure, mm",
+    "structure, share",
+];
+
+fn measures(d: &ShapeDistance) -> [f64; 6] {
+    [
+        d.with_size_mm,
+        d.without_size,
+        d.distribution_mm,
+        d.distribution,
+        d.structure_mm,
+        d.structure,
+    ]
+}
+
+/// Names every bone of either set by its nearest in the other; prints who is taken for whom.
+fn identity(title: &str, a: &Named, b: &Named, mirrored: bool) {
     let settings = MatchingSettings {
-        mirrored: true,
+        mirrored,
         ..Default::default()
     };
-    let mut right_names = [0, 0, 0];
-    for (name, target) in &right {
-        let all: Vec<_> = left
-            .iter()
-            .map(|(n, s)| (n, match_scaffolds(target, s, &settings).shape_distance))
+    let table: Vec<Vec<[f64; 6]>> = a
+        .iter()
+        .map(|(_, s)| {
+            b.iter()
+                .map(|(_, t)| measures(&match_scaffolds(s, t, &settings).shape_distance))
+                .collect()
+        })
+        .collect();
+    println!("\n{title}: nearest of the other set, wrong ones named\n");
+    println!("| bone | {} |", MEASURES.join(" | "));
+    println!("|---|{}", "---|".repeat(MEASURES.len()));
+    let mut right = [0; 6];
+    let mut row = |name: &str, others: &Named, distance: &dyn Fn(usize) -> [f64; 6]| {
+        let cells: Vec<String> = (0..MEASURES.len())
+            .map(|m| {
+                let nearest = (0..others.len())
+                    .min_by(|&i, &j| distance(i)[m].total_cmp(&distance(j)[m]))
+                    .expect("there are bones");
+                if others[nearest].0 == name {
+                    right[m] += 1;
+                    "right".to_owned()
+                } else {
+                    others[nearest].0.clone()
+                }
+            })
             .collect();
-        let nearest = |f: &dyn Fn(usize) -> f64| {
-            (0..all.len())
-                .min_by(|&a, &b| f(a).total_cmp(&f(b)))
-                .map(|i| all[i].0)
-        };
-        let picks = [
-            nearest(&|i| all[i].1.with_size_mm),
-            nearest(&|i| all[i].1.without_size),
-            nearest(&|i| all[i].1.structure),
-        ];
-        for (count, pick) in right_names.iter_mut().zip(&picks) {
-            *count += usize::from(*pick == Some(name));
+        if cells.iter().any(|c| c != "right") {
+            println!("| {name} | {} |", cells.join(" | "));
         }
-        println!("<!-- {name}: {picks:?} -->");
+    };
+    for (i, (name, _)) in a.iter().enumerate() {
+        row(name, b, &|j| table[i][j]);
+    }
+    for (j, (name, _)) in b.iter().enumerate() {
+        row(name, a, &|i| table[i][j]);
+    }
+    let total = a.len() + b.len();
+    println!(
+        "| **right of {total}** | {} |",
+        right.map(|r| r.to_string()).join(" | ")
+    );
+}
+
+/// One bone of one individual of the synthetic population.
+struct Member {
+    bone: &'static str,
+    person: u64,
+    /// From the reference, person 0.
+    warp: Warp,
+    scaffold: CoarseScaffold,
+}
+
+/// Eight carpal-like bones of several individuals: who is nearest, and who corresponds to whom.
+fn population(persons: u64) {
+    let mut members = Vec::new();
+    for kind in synthetic::Bone::ALL {
+        let reference = synthetic::bone(kind, 0);
+        let modes = synthetic_population::modes(&reference.bounds());
+        for person in 0..persons {
+            let (shape, warp) = if person == 0 {
+                (reference.clone(), synthetic_population::warp_of(&modes, &[]))
+            } else {
+                let one = synthetic_population::individual(&reference, person);
+                (one.shape, one.warp)
+            };
+            let made = shape.mesh(20_000);
+            let mesh = TriangleMesh {
+                points: made.points,
+                triangles: made.triangles,
+            };
+            if let Some(scaffold) = scaffold(&mesh, 10_000, 1 + person, 0.0) {
+                members.push(Member {
+                    bone: kind.name(),
+                    person,
+                    warp,
+                    scaffold,
+                });
+            }
+        }
+    }
+    let settings = MatchingSettings::default();
+    let found: Vec<Vec<Option<Matching>>> = members
+        .iter()
+        .enumerate()
+        .map(|(i, a)| {
+            let with = |(j, b): (usize, &Member)| {
+                (j < i && a.person != b.person).then(|| match_scaffolds(&b.scaffold, &a.scaffold, &settings))
+            };
+            members.iter().enumerate().map(with).collect()
+        })
+        .collect();
+    let between = |i: usize, j: usize| found[i.max(j)][i.min(j)].as_ref();
+    println!(
+        "\n{persons} individuals of 8 carpal-like bones, each against the bones of all others: the nearest, wrong ones named\n"
+    );
+    println!("| bone | {} |", MEASURES.join(" | "));
+    println!("|---|{}", "---|".repeat(MEASURES.len()));
+    let mut right = [0; 6];
+    for (i, a) in members.iter().enumerate() {
+        let cells: Vec<String> = (0..MEASURES.len())
+            .map(|m| {
+                let nearest = (0..members.len())
+                    .filter_map(|j| Some((measures(&between(i, j)?.shape_distance)[m], j)))
+                    .min_by(|x, y| x.0.total_cmp(&y.0));
+                match nearest {
+                    Some((_, j)) if members[j].bone == a.bone => {
+                        right[m] += 1;
+                        "right".to_owned()
+                    }
+                    Some((_, j)) => members[j].bone.to_owned(),
+                    None => "none".to_owned(),
+                }
+            })
+            .collect();
+        if cells.iter().any(|c| c != "right") {
+            println!("| {} of {} | {} |", a.bone, a.person, cells.join(" | "));
+        }
     }
     println!(
-        "\n| right bones whose nearest mirrored left one is their own | with size | without size | structure alone |\n|---|---|---|---|"
+        "| **right of {}** | {} |",
+        members.len(),
+        right.map(|r| r.to_string()).join(" | ")
     );
-    println!(
-        "| {} | {} | {} | {} |",
-        right.len(),
-        right_names[0],
-        right_names[1],
-        right_names[2]
-    );
+    let mut counts = Counts::default();
+    for (i, a) in members.iter().enumerate() {
+        for (j, b) in members.iter().enumerate() {
+            // The reference is the target: it comes first in the list of its bone.
+            if a.bone == b.bone
+                && (b.person, a.person) != (0, 0)
+                && b.person == 0
+                && let Some(m) = between(i, j)
+            {
+                counts.add(b, a, m);
+            }
+        }
+    }
+    counts.print();
+}
+
+/// How many elements of the reference have a counterpart in an individual, and how many of those matching finds.
+#[derive(Default)]
+struct Counts {
+    poses: usize,
+    within: usize,
+    curves: [usize; 3],
+    sheets: [usize; 3],
+}
+
+impl Counts {
+    /// The true counterpart of an element is the nearest of its kind to where the warp takes it, when both lie within 4 % of the
+    /// diagonal of one another on average; an element without one does not count.
+    fn add(&mut self, target: &Member, source: &Member, m: &Matching) {
+        let (a, b) = (&target.scaffold, &source.scaffold);
+        let reach = 0.04 * a.diagonal_mm;
+        let cut = 1.5 * a.tolerance_mm.max(b.tolerance_mm);
+        // Individuals are in the frame of the reference: the pose should be near the identity.
+        self.poses += 1;
+        self.within += usize::from(m.T_target_source.rotation_angle_deg(&Rigid::IDENTITY) < 15.0);
+        let axial = |c: &&Curve| c.kind == CurveKind::Axial && c.persistence > cut;
+        let points = |c: &Curve| -> Vec<DVec3> { c.polyline.iter().map(|p| p.position).collect() };
+        for c in a.curves.iter().filter(axial) {
+            let moved: Vec<DVec3> = points(c)
+                .into_iter()
+                .map(|p| target_to_source(source, p))
+                .collect();
+            let others = b.curves.iter().filter(axial).map(|d| (d.id.0, points(d)));
+            let truth = counterpart(&moved, others, reach);
+            let named = m.correspondences.curves.iter().find(|p| p.target == c.id);
+            tally(&mut self.curves, truth, named.map(|p| p.source.0));
+        }
+        let spots = |s: &Sheet| -> Vec<DVec3> {
+            let step = s.mesh.vertices.len().div_ceil(300).max(1);
+            s.mesh.vertices.iter().step_by(step).map(|v| v.position).collect()
+        };
+        for s in a.sheets.iter().filter(|s| s.persistence > cut) {
+            let moved: Vec<DVec3> = spots(s)
+                .into_iter()
+                .map(|p| target_to_source(source, p))
+                .collect();
+            let others = b
+                .sheets
+                .iter()
+                .filter(|t| t.persistence > cut)
+                .map(|t| (t.id.0, spots(t)));
+            let truth = counterpart(&moved, others, reach);
+            let named = m.correspondences.sheets.iter().find(|p| p.target == s.id);
+            tally(&mut self.sheets, truth, named.map(|p| p.source.0));
+        }
+    }
+
+    fn print(&self) {
+        println!(
+            "\nReference against individual, by the warp that made it ({} pairs, {} within 15 degrees):\n",
+            self.poses, self.within
+        );
+        println!(
+            "| elements of persistence > 1.5 tau with a counterpart | named right | named wrong | left out |"
+        );
+        println!("|---|---|---|---|");
+        for (name, c) in [("axial curves", self.curves), ("sheets", self.sheets)] {
+            println!(
+                "| {} {name} | {} | {} | {} |",
+                c.iter().sum::<usize>(),
+                c[0],
+                c[1],
+                c[2]
+            );
+        }
+    }
+}
+
+fn target_to_source(source: &Member, p: DVec3) -> DVec3 {
+    source.warp.apply(p)
+}
+
+/// Right, wrong, left out.
+fn tally(counts: &mut [usize; 3], truth: Option<u32>, named: Option<u32>) {
+    match (truth, named) {
+        (Some(t), Some(n)) if t == n => counts[0] += 1,
+        (Some(_), Some(_)) => counts[1] += 1,
+        (Some(_), None) => counts[2] += 1,
+        (None, _) => {}
+    }
+}
+
+/// The candidate nearest to the points, both ways on average, when that is within reach.
+fn counterpart(
+    points: &[DVec3],
+    candidates: impl Iterator<Item = (u32, Vec<DVec3>)>,
+    reach: f64,
+) -> Option<u32> {
+    let one_way = |from: &[DVec3], to: &[DVec3]| {
+        let nearest = |p: &DVec3| to.iter().map(|q| p.distance(*q)).fold(f64::INFINITY, f64::min);
+        from.iter().map(nearest).sum::<f64>() / from.len().max(1) as f64
+    };
+    candidates
+        .map(|(id, other)| (one_way(points, &other).max(one_way(&other, points)), id))
+        .filter(|c| c.0 < reach)
+        .min_by(|x, y| x.0.total_cmp(&y.0))
+        .map(|c| c.1)
 }
 
 /// The whole way from a mesh to its coarse scaffold; noise in spacings.

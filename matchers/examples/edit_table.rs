@@ -17,8 +17,14 @@ use std::time::Instant;
 fn main() {
     let args: Vec<usize> = std::env::args().skip(1).filter_map(|a| a.parse().ok()).collect();
     let pairs = args.first().copied().unwrap_or(20);
-    let sizes = if args.len() > 1 { args[1..].to_vec() } else { vec![4, 6, 8, 10, 12, 20] };
-    println!("| nodes, curves, sheets | pair | operations | proven | lower / upper, mean of the others | median ms | largest ms | median search nodes |");
+    let sizes = if args.len() > 1 {
+        args[1..].to_vec()
+    } else {
+        vec![4, 6, 8, 10, 12, 20]
+    };
+    println!(
+        "| nodes, curves, sheets | pair | operations | proven | lower / upper, mean of the others | median ms | largest ms | median search nodes |"
+    );
     println!("|---|---|---|---|---|---|---|---|");
     for &n in &sizes {
         for related in [true, false] {
@@ -30,7 +36,11 @@ fn main() {
 }
 
 fn row(n: usize, related: bool, heals: bool, pairs: usize) {
-    let settings = EditSettings { contract: heals, merge: heals, ..EditSettings::default() };
+    let settings = EditSettings {
+        contract: heals,
+        merge: heals,
+        ..EditSettings::default()
+    };
     let (mut proven, mut ratios, mut times, mut nodes) = (0, Vec::new(), Vec::new(), Vec::new());
     for seed in 0..pairs as u64 {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -60,7 +70,11 @@ fn row(n: usize, related: bool, heals: bool, pairs: usize) {
         n / 2,
         if related { "edited" } else { "unrelated" },
         if heals { "all" } else { "deform, splice" },
-        if ratios.is_empty() { "-".to_owned() } else { format!("{mean:.2}") },
+        if ratios.is_empty() {
+            "-".to_owned()
+        } else {
+            format!("{mean:.2}")
+        },
         median(&mut times),
         times.last().copied().unwrap_or(0.0),
         median(&mut nodes),

@@ -191,6 +191,8 @@ pub struct Curve {
     pub weight: f64,
     /// Price of shrinking the curve to a point, so that its ends become one node, incidences included; `None` forbids it.
     pub contract_price: Option<f64>,
+    /// Class of the curve: curves of different classes never merge.
+    pub class: u32,
     /// Attributes, as many as every other curve has.
     pub attributes: Vec<f64>,
 }
@@ -276,6 +278,7 @@ impl AttributedHypergraph {
             ends,
             weight,
             contract_price: None,
+            class: 0,
             attributes,
         });
         Ok(CurveId::from_index(index))
@@ -297,6 +300,17 @@ impl AttributedHypergraph {
             check(Kind::Curve, curve.index(), p, &[], None)?;
         }
         self.curves[curve.index()].contract_price = price;
+        Ok(())
+    }
+
+    /// Sets the class of a curve, 0 unless set: curves of different classes never merge.
+    ///
+    /// # Errors
+    /// When the curve does not exist.
+    pub fn set_class(&mut self, curve: CurveId, class: u32) -> Result<(), HypergraphError> {
+        let count = self.curves.len();
+        refer(Kind::Curve, curve.index(), Kind::Curve, curve.index(), count)?;
+        self.curves[curve.index()].class = class;
         Ok(())
     }
 

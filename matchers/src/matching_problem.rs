@@ -265,23 +265,6 @@ impl Incidences {
         s
     }
 
-    /// Incidences by (first, second, strength), ordered and each given once; a strength of zero keeps its place.
-    pub(crate) fn with_support(
-        first: usize,
-        second: usize,
-        triples: impl Iterator<Item = (u32, u32, f64)>,
-    ) -> Self {
-        let mut s = Self {
-            forward: vec![Vec::new(); first],
-            backward: vec![Vec::new(); second],
-        };
-        for (a, b, strength) in triples {
-            s.forward[a as usize].push(Incident { element: b, strength });
-            s.backward[b as usize].push(Incident { element: a, strength });
-        }
-        s
-    }
-
     /// Strength of the incidence of two elements, zero when they are not incident.
     pub fn strength(&self, first: usize, second: usize) -> f64 {
         let list = &self.forward[first];

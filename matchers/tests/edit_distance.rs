@@ -11,9 +11,7 @@ use matchers::edit_distance::{
 use matchers::graduated_assignment::{MatchSettings, match_hypergraphs};
 use matchers::hypergraph::Kind;
 use matchers::matching_problem::{ElementMap, Side};
-use matchers::{
-    AttributedHypergraph, CurveEnds, ElementCosts, EvidenceSettings, MatchingProblem, Table,
-};
+use matchers::{AttributedHypergraph, CurveEnds, ElementCosts, EvidenceSettings, MatchingProblem, Table};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -246,7 +244,10 @@ fn the_path_can_be_replayed() {
                 .map(|(_, rk, r, jk, j)| {
                     let same =
                         |c: &&Heal| (c.removed_kind, c.removed, c.joined_kind, c.joined) == (rk, r, jk, j);
-                    all.iter().find(same).expect("the path names a heal of its graph").clone()
+                    all.iter()
+                        .find(same)
+                        .expect("the path names a heal of its graph")
+                        .clone()
                 })
                 .collect();
             apply(graph, &list).expect("the heals of a path agree")

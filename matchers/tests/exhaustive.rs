@@ -124,46 +124,73 @@ impl Dress {
 }
 
 /// The cheapest price over all maps of the nodes. With the nodes fixed the curves are independent of one another, and the best
-/// partial assignment of curves is an LSAP, which `assignment.rs` checks against brute force. A node map whose curves could
-/// not reach the best even if they shared partners is passed over.
+/// partial assignment of curves is an LSAP, which `assignment.rs` checks against brute force. Maps are tried in the order of
+/// what their curves would gain if they could share partners, until that is no more than the best found.
 fn exhaustive(problem: &MatchingProblem, maps: &[Vec<Option<usize>>]) -> f64 {
     let (n, m) = (problem.target.count(1), problem.source.count(1));
+    let (nodes_t, nodes_s) = (problem.target.count(0), problem.source.count(0));
     let ends = |side: &Side, curve: usize| -> Vec<(usize, f64)> {
         let list = &side.incidences[0].backward[curve];
         list.iter().map(|i| (i.element as usize, i.strength)).collect()
     };
     let target_ends: Vec<_> = (0..n).map(|e| ends(&problem.target, e)).collect();
     let source_ends: Vec<_> = (0..m).map(|f| ends(&problem.source, f)).collect();
-    let own = Table::from_fn(n, m, |e, f| problem.pair_gain(1, e, f));
-    let mut best = 0.0;
-    let mut table = Table::zeros(n, m);
-    for map in maps {
-        let nodes: f64 = map
-            .iter()
-            .enumerate()
-            .filter_map(|(x, y)| y.map(|y| problem.pair_gain(0, x, y)))
-            .sum();
-        let mut ceiling = nodes;
-        for e in 0..n {
-            let mut row = 0.0f64;
-            for f in 0..m {
-                let mut gain = own[(e, f)];
-                for &(x, q) in &target_ends[e] {
-                    for &(y, r) in &source_ends[f] {
-                        if map[x] == Some(y) {
-                            gain += 2.0 * q.min(r);
-                        }
-                    }
+    // What curves e and f gain when the ends of e, in their order, go to the nodes given.
+    let gain = |e: usize, f: usize, images: &[Option<usize>]| {
+        let mut gain = problem.pair_gain(1, e, f);
+        for (&(_, q), image) in target_ends[e].iter().zip(images) {
+            for &(y, r) in &source_ends[f] {
+                if *image == Some(y) {
+                    gain += 2.0 * q.min(r);
                 }
-                table[(e, f)] = gain.max(0.0);
-                row = row.max(gain);
             }
-            ceiling += row;
         }
-        if ceiling > best {
-            let curves = -assignment::solve_max(&table).unwrap().cost;
-            best = f64::max(best, nodes + curves);
+        gain.max(0.0)
+    };
+    let place = |image: Option<usize>| image.map_or(nodes_s, |y| y);
+    let image = |place: usize| (place < nodes_s).then_some(place);
+    let width = nodes_s + 1;
+    let best_of_row: Vec<Vec<f64>> = (0..n)
+        .map(|e| {
+            (0..width * width)
+                .map(|k| {
+                    let images = [image(k / width), image(k % width)];
+                    (0..m).map(|f| gain(e, f, &images)).fold(0.0, f64::max)
+                })
+                .collect()
+        })
+        .collect();
+    let images = |map: &[Option<usize>], e: usize| -> [Option<usize>; 2] {
+        let mut list = target_ends[e].iter().map(|&(x, _)| map[x]);
+        [list.next().flatten(), list.next().flatten()]
+    };
+    let own: Vec<Vec<f64>> = (0..nodes_t)
+        .map(|x| (0..nodes_s).map(|y| problem.pair_gain(0, x, y)).collect())
+        .collect();
+    let nodes = |map: &[Option<usize>]| -> f64 {
+        let pairs = map.iter().enumerate().filter_map(|(x, y)| y.map(|y| own[x][y]));
+        pairs.sum()
+    };
+    let mut order: Vec<(f64, usize)> = maps
+        .iter()
+        .enumerate()
+        .map(|(k, map)| {
+            let curves = (0..n).map(|e| {
+                let [a, b] = images(map, e);
+                best_of_row[e][place(a) * width + place(b)]
+            });
+            (nodes(map) + curves.sum::<f64>(), k)
+        })
+        .collect();
+    order.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut best = 0.0;
+    for (ceiling, k) in order {
+        if ceiling <= best {
+            break;
         }
+        let table = Table::from_fn(n, m, |e, f| gain(e, f, &images(&maps[k], e)));
+        let curves = -assignment::solve_max(&table).unwrap().cost;
+        best = f64::max(best, nodes(&maps[k]) + curves);
     }
     problem.total() - best
 }
@@ -203,15 +230,27 @@ fn check_pairs(dress: Dress, most: usize, every: usize) {
     let chosen: Vec<_> = pairs.iter().step_by(every).collect();
     chosen.par_iter().for_each(|&&(k, l)| {
         let (t, s) = (&graphs[k], &graphs[l]);
-        check_pair(dress, (t, k as u64), (s, 1000 + l as u64), &maps[t.nodes][s.nodes]);
+        check_pair(
+            dress,
+            (t, k as u64),
+            (s, 1000 + l as u64),
+            &maps[t.nodes][s.nodes],
+        );
     });
-    println!("{dress:?}: {} of {} pairs of up to {most} nodes", chosen.len(), pairs.len());
+    println!(
+        "{dress:?}: {} of {} pairs of up to {most} nodes",
+        chosen.len(),
+        pairs.len()
+    );
 }
 
 /// All 21 945 pairs of the 209 graphs when slow; else all 190 of the 19 graphs of up to 4 nodes and a sample beyond.
 #[test]
 fn equals_exhaustive_search_on_all_pairs_of_bare_graphs() {
-    assert_eq!((0..=6).map(|n| all_graphs(n).len()).collect::<Vec<_>>(), [1, 1, 2, 4, 11, 34, 156]);
+    assert_eq!(
+        (0..=6).map(|n| all_graphs(n).len()).collect::<Vec<_>>(),
+        [1, 1, 2, 4, 11, 34, 156]
+    );
     if slow() {
         check_pairs(Dress::Bare, 6, 1);
     } else {
@@ -240,7 +279,13 @@ fn heal_sets(g: &AttributedHypergraph) -> Vec<Healed> {
     found
 }
 
-fn extend(g: &AttributedHypergraph, all: &[Heal], next: usize, chosen: &mut Vec<Heal>, found: &mut Vec<Healed>) {
+fn extend(
+    g: &AttributedHypergraph,
+    all: &[Heal],
+    next: usize,
+    chosen: &mut Vec<Heal>,
+    found: &mut Vec<Healed>,
+) {
     // A set that contradicts itself does so in every larger set.
     let Some(healed) = apply(g, chosen) else {
         return;
@@ -312,7 +357,10 @@ fn with_heals_equals_exhaustive_search_on_all_pairs_of_graphs() {
         .par_iter()
         .flat_map_iter(|&(k, l)| [(Dress::Bare, k, l), (Dress::Attributed, k, l)])
         .map(|(dress, k, l)| {
-            let (g, h) = (dress.graph(&graphs[k], k as u64), dress.graph(&graphs[l], 1000 + l as u64));
+            let (g, h) = (
+                dress.graph(&graphs[k], k as u64),
+                dress.graph(&graphs[l], 1000 + l as u64),
+            );
             let costs = ElementCosts::from_attributes(&g, &h, &dress.scales()).unwrap();
             let truth = exhaustive_heals((&g, &h), &costs, solve);
             let d = edit_distance(&g, &h, &costs, &EditSettings::default()).unwrap();
@@ -328,7 +376,10 @@ fn with_heals_equals_exhaustive_search_on_all_pairs_of_graphs() {
         })
         .collect();
     let used = healed.iter().filter(|h| **h).count();
-    println!("{} pairs of up to {most} nodes with heals, {used} healed", healed.len());
+    println!(
+        "{} pairs of up to {most} nodes with heals, {used} healed",
+        healed.len()
+    );
     assert!(used > 0, "no case needed a heal");
 }
 
@@ -372,7 +423,8 @@ fn loops_and_parallel_curves_are_told_apart() {
         let b = g.add_node(1.0, vec![1.0]).unwrap();
         for &(x, y) in ends {
             let at = |k: u32| if k == 0 { a } else { b };
-            g.add_curve(CurveEnds::Two(at(x), at(y)), 1.0, vec![5.0, 1.0]).unwrap();
+            g.add_curve(CurveEnds::Two(at(x), at(y)), 1.0, vec![5.0, 1.0])
+                .unwrap();
         }
         let all = (0..ends.len()).map(CurveId::from_index).collect();
         g.add_sheet(all, 2.0, vec![9.0]).unwrap();
@@ -384,7 +436,11 @@ fn loops_and_parallel_curves_are_told_apart() {
         assert!(d.exact);
         d.upper_bound
     };
-    let (single, parallel, looped) = (graph(&[(0, 1)]), graph(&[(0, 1), (0, 1)]), graph(&[(0, 1), (0, 0)]));
+    let (single, parallel, looped) = (
+        graph(&[(0, 1)]),
+        graph(&[(0, 1), (0, 1)]),
+        graph(&[(0, 1), (0, 0)]),
+    );
     // A curve more: its weight 1, its two ends and its place on the sheet 0.5 each.
     assert!((distance(&single, &parallel) - 2.5).abs() < 1e-12);
     assert!((distance(&single, &looped) - 2.5).abs() < 1e-12);

@@ -2,12 +2,14 @@
 //!
 //! In: the elements of both scaffolds above the cut, a pose when one is known. Out: tables of costs in mm.
 //!
-//! With `s(a, b) = |a - b| / (a + b)`, which is 0 for equal and 1 for incomparable sizes (Chang and Kimia 2009 use its like):
+//! With `s(a, b) = |a - b| / (a + b)`, which is 0 for equal and 1 for incomparable sizes (Chang and Kimia 2009 use its like), and for
+//! distances from the centroid `|a - b|` as a share of the mean spread of both scaffolds, at most 1 (a sheet may lie at the centroid, where a ratio
+//! of distances means nothing):
 //!
-//! * node: `0.5 s(radius) + 0.5 s(distance from the centroid)`, plus 0.1 when the kinds differ (an A1^4 that was split);
-//! * curve: `0.35 s(length) + 0.35` mean `s(radius)` along it `+ 0.3` mean `s(distance from the centroid)` along it, in the better
+//! * node: `0.5 s(radius) + 0.5` distance from the centroid, plus 0.1 when the kinds differ (an A1^4 that was split);
+//! * curve: `0.35 s(length) + 0.35` mean `s(radius)` along it `+ 0.3` mean distance from the centroid along it, in the better
 //!   of both directions (for a closed curve of all turns); never between kinds;
-//! * sheet: `0.3 s(sqrt area) + 0.25 s(mean radius) + 0.15 s(max radius) + 0.2` mean `s(deviations) + 0.1 s(distance)`.
+//! * sheet: `0.3 s(sqrt area) + 0.25 s(mean radius) + 0.15 s(max radius) + 0.2` mean `s(deviations) + 0.1` distance from the centroid.
 //!
 //! Divided by `unlike` it is 1 when nothing is in common. Under a pose the place joins in: mean distance in four dimensions
 //! (radius included) over the reach. The cost of a pair of evidence `w`, `w'` and difference `d` is
@@ -52,13 +54,14 @@ pub(crate) fn costs(
         };
         (w - v).abs() + 2.0 * w.min(v) * d.min(1.0)
     };
+    let size_mm = 0.5 * (target.size_mm + source.size_mm);
     let nodes = Table::from_fn(target.nodes.len(), source.nodes.len(), |i, j| {
         let (a, b) = (&target.nodes[i], &source.nodes[j]);
         let place = placement.map(|p| {
             let moved = p.pose.apply(b.position);
             moved.distance(a.position).hypot(a.radius - b.radius) / p.reach_mm
         });
-        price(a.evidence, b.evidence, node_difference(a, b), place)
+        price(a.evidence, b.evidence, node_difference(a, b, size_mm), place)
     });
     let curves = Table::from_fn(target.curves.len(), source.curves.len(), |i, j| {
         let (a, b) = (&target.curves[i], &source.curves[j]);
@@ -66,7 +69,7 @@ pub(crate) fn costs(
             return f64::INFINITY;
         }
         let place = placement.map(|p| apart(&a.profile, &b.profile, &p));
-        price(a.evidence, b.evidence, curve_difference(a, b), place)
+        price(a.evidence, b.evidence, curve_difference(a, b, size_mm), place)
     });
     let sheets = Table::from_fn(target.sheets.len(), source.sheets.len(), |i, j| {
         let (a, b) = (&target.sheets[i], &source.sheets[j]);
@@ -77,7 +80,7 @@ pub(crate) fn costs(
                 apart(&a.places, &b.places, &p)
             }
         });
-        price(a.evidence, b.evidence, sheet_difference(a, b), place)
+        price(a.evidence, b.evidence, sheet_difference(a, b, size_mm), place)
     });
     ElementCosts {
         nodes,
@@ -92,18 +95,27 @@ fn s(a: f64, b: f64) -> f64 {
     if sum > 0.0 { (a - b).abs() / sum } else { 0.0 }
 }
 
-fn node_difference(a: &NodeFacts, b: &NodeFacts) -> f64 {
-    let kind = if a.kind == b.kind { 0.0 } else { 0.1 };
-    0.5 * s(a.radius, b.radius) + 0.5 * s(a.remoteness, b.remoteness) + kind
+/// Difference of two distances from the centroid as a share of the spread, 0 to 1.
+fn far(a: f64, b: f64, size_mm: f64) -> f64 {
+    if size_mm > 0.0 {
+        ((a - b).abs() / size_mm).min(1.0)
+    } else {
+        0.0
+    }
 }
 
-fn curve_difference(a: &CurveFacts, b: &CurveFacts) -> f64 {
+fn node_difference(a: &NodeFacts, b: &NodeFacts, size_mm: f64) -> f64 {
+    let kind = if a.kind == b.kind { 0.0 } else { 0.1 };
+    0.5 * s(a.radius, b.radius) + 0.5 * far(a.remoteness, b.remoteness, size_mm) + kind
+}
+
+fn curve_difference(a: &CurveFacts, b: &CurveFacts, size_mm: f64) -> f64 {
     let along = |order: &dyn Fn(usize) -> usize| {
         let mut sum = 0.0;
         for k in 0..PROFILE {
             let m = order(k);
             sum += 0.35 * s(a.profile[k].radius, b.profile[m].radius)
-                + 0.3 * s(a.remoteness[k], b.remoteness[m]);
+                + 0.3 * far(a.remoteness[k], b.remoteness[m], size_mm);
         }
         sum / PROFILE as f64
     };
@@ -123,13 +135,13 @@ fn curve_difference(a: &CurveFacts, b: &CurveFacts) -> f64 {
     0.35 * s(a.length, b.length) + best
 }
 
-fn sheet_difference(a: &SheetFacts, b: &SheetFacts) -> f64 {
+fn sheet_difference(a: &SheetFacts, b: &SheetFacts, size_mm: f64) -> f64 {
     let deviations = (0..3).map(|k| s(a.deviations[k], b.deviations[k])).sum::<f64>() / 3.0;
     0.3 * s(a.area.sqrt(), b.area.sqrt())
         + 0.25 * s(a.mean_radius, b.mean_radius)
         + 0.15 * s(a.max_radius, b.max_radius)
         + 0.2 * deviations
-        + 0.1 * s(a.remoteness, b.remoteness)
+        + 0.1 * far(a.remoteness, b.remoteness, size_mm)
 }
 
 /// Mean distance of two sets of medial points to the nearest of the other, radius included, in reaches.

@@ -4,23 +4,24 @@
 //!    of (A, B) is exactly the mirror of that of (B, A).
 //! 2. Graduated assignment on attributes alone; its pairs give a guess of the pose by consistency and robust fit.
 //! 3. That guess and those of the moments compete in the alignment of medial points ([`super::dense`]).
-//! 4. Graduated assignment again, with places under the pose, improved and bounded by branch and bound: now the pairs are the
-//!    correspondences.
-//! 5. The map becomes an edit path; the medial residual, with and without size, and the path's price the shape distance.
+//! 4. The edit distance, with places under the pose, bounded and where it is small enough proven by branch and bound; graduated
+//!    assignment from its map gives the correspondences, one to one, with their evidence.
+//! 5. The edit path is put into words; the medial residual and the difference of the signatures, with and
+//!    without size, and the price by attributes alone are the shape distance.
 
 use super::compatibility::{Placement, costs};
 use super::dense::{DenseFit, align};
+use super::edit_path::edit_path;
 use super::evidence::Evidence;
 use super::moments::moments;
-use super::result::{
-    Correspondences, Edit, EditOperation, Elements, Matching, Pair, PoseHypothesis, ShapeDistance,
-};
+use super::result::{Correspondences, Edit, Elements, Matching, Pair, PoseHypothesis, ShapeDistance};
 use super::samples::MedialSamples;
 use super::settings::MatchingSettings;
+use super::signature::Signature;
 use crate::coarse_scaffold::hypergraph::CoarseScaffold;
 use crate::geometry::{CurveId, NodeId, Rigid, SheetId};
 use glam::{DMat3, DVec3};
-use matchers::edit_distance::branch_and_bound;
+use matchers::edit_distance::{EditDistance, EditSettings, edit_distance};
 use matchers::graduated_assignment::{HypergraphMatch, MatchSettings, match_hypergraphs};
 use matchers::pose::{RobustPoseSettings, robust_pose};
 use matchers::{ElementCosts, EvidenceSettings, MatchingProblem};
@@ -99,13 +100,12 @@ fn run(
         pose,
         reach_mm: settings.reach * 0.5 * (target.diagonal_mm + source.diagonal_mm),
     });
-    let assigned = pair.assign(placement, &settings);
-    let mut shape_distance = pair.shape_distance(&fits, &settings);
+    let assigned = pair.assign_and_edit(placement, &settings);
+    let shape_distance = pair.shape_distance(&fits, &settings);
     let (correspondences, edit) = match &assigned {
         Some(a) => {
-            shape_distance.structure_mm = a.matched.price;
-            shape_distance.structure = 1.0 - a.matched.similarity;
-            (pair.correspondences(a), pair.edit(a))
+            let path = edit_path(&a.distance, &pair.first, &pair.second, pair.turned);
+            (pair.correspondences(&a.matched), path)
         }
         None => (
             Correspondences::default(),
@@ -140,14 +140,10 @@ struct OrderedPair {
     cut_mm: f64,
 }
 
-/// A match in the inner order with the costs it was found under.
+/// A match in the inner order, and the edit distance that goes with it.
 struct Assigned {
     matched: HypergraphMatch,
-    costs: ElementCosts,
-    /// No map is cheaper than this, mm.
-    lower_bound: f64,
-    /// The map is proven to be the cheapest.
-    exact: bool,
+    distance: EditDistance,
 }
 
 impl OrderedPair {
@@ -178,11 +174,9 @@ impl OrderedPair {
         } else {
             second
         };
-        let facts =
-            |s: &CoarseScaffold, m: &MedialSamples| Evidence::new(s, cut_mm, moments(&m.positions).centroid);
         Self {
-            first: facts(first, &first_samples),
-            second: facts(second, &second_samples),
+            first: Evidence::new(first, cut_mm),
+            second: Evidence::new(second, cut_mm),
             first_samples,
             second_samples,
             turned,
@@ -224,7 +218,7 @@ impl OrderedPair {
 
     /// Pose from the pairs that attributes and incidences alone name.
     fn guess(&self, settings: &MatchingSettings) -> Option<Rigid> {
-        let assigned = self.assign(None, settings)?;
+        let matched = self.assign(settings)?;
         let mut from = Vec::new();
         let mut to = Vec::new();
         let mut weights = Vec::new();
@@ -234,14 +228,14 @@ impl OrderedPair {
             to.push(point(first));
             weights.push(weight.max(1e-9));
         };
-        for p in &assigned.matched.nodes {
+        for p in &matched.nodes {
             let (a, b) = (
                 &self.first.nodes[p.target as usize],
                 &self.second.nodes[p.source as usize],
             );
             add(b.position, a.position, a.evidence.min(b.evidence));
         }
-        for p in &assigned.matched.curves {
+        for p in &matched.curves {
             let (a, b) = (
                 &self.first.curves[p.target as usize],
                 &self.second.curves[p.source as usize],
@@ -256,7 +250,7 @@ impl OrderedPair {
                 );
             }
         }
-        for p in &assigned.matched.sheets {
+        for p in &matched.sheets {
             let (a, b) = (
                 &self.first.sheets[p.target as usize],
                 &self.second.sheets[p.source as usize],
@@ -272,34 +266,44 @@ impl OrderedPair {
         Some(super::dense::to_rigid(&found.pose))
     }
 
-    /// Graduated assignment; under a pose its map is then improved and bounded by branch and bound.
-    fn assign(&self, placement: Option<Placement>, settings: &MatchingSettings) -> Option<Assigned> {
-        let costs = costs(&self.first, &self.second, placement, settings);
-        let problem = MatchingProblem::new(
-            &self.first.graph,
-            &self.second.graph,
-            &costs,
-            &EvidenceSettings::default(),
-        );
+    /// The problem of matching both; none when there is nothing to compare.
+    fn problem(&self, costs: &ElementCosts) -> Option<MatchingProblem> {
         // The tables were made for these graphs, and costs are at least 0 or infinite.
-        let problem = problem.ok()?;
-        let start = MatchSettings::default();
-        let mut matched = match_hypergraphs(&problem, &[], &start);
-        let (mut lower_bound, mut exact) = (0.0, false);
-        if placement.is_some() {
-            let proof = branch_and_bound::search(&problem, &matched.map, settings.search_nodes);
-            if proof.upper_bound < matched.price {
-                matched = match_hypergraphs(&problem, &[proof.map], &start);
-            }
-            lower_bound = proof.lower_bound.min(matched.price);
-            exact = proof.exact;
-        }
-        Some(Assigned {
-            matched,
-            costs,
-            lower_bound,
-            exact,
-        })
+        let evidence = EvidenceSettings::default();
+        MatchingProblem::new(&self.first.graph, &self.second.graph, costs, &evidence).ok()
+    }
+
+    /// Graduated assignment by attributes and incidences alone.
+    fn assign(&self, settings: &MatchingSettings) -> Option<HypergraphMatch> {
+        let costs = costs(&self.first, &self.second, None, settings);
+        Some(match_hypergraphs(
+            &self.problem(&costs)?,
+            &[],
+            &MatchSettings::default(),
+        ))
+    }
+
+    /// The edit distance under a pose, or by attributes alone.
+    fn edit_distance(
+        &self,
+        placement: Option<Placement>,
+        settings: &MatchingSettings,
+    ) -> Option<EditDistance> {
+        let costs = costs(&self.first, &self.second, placement, settings);
+        let edit = EditSettings {
+            max_search_nodes: settings.search_nodes,
+            ..EditSettings::default()
+        };
+        edit_distance(&self.first.graph, &self.second.graph, &costs, &edit).ok()
+    }
+
+    /// The edit distance under a pose, and the assignment that starts from its map: pairs of elements with their evidence.
+    fn assign_and_edit(&self, placement: Option<Placement>, settings: &MatchingSettings) -> Option<Assigned> {
+        let distance = self.edit_distance(placement, settings)?;
+        let problem = self.problem(&costs(&self.first, &self.second, placement, settings))?;
+        let hypothesis = distance.map(&self.first.graph);
+        let matched = match_hypergraphs(&problem, &[hypothesis], &MatchSettings::default());
+        Some(Assigned { matched, distance })
     }
 
     fn ambiguous(&self, fits: &[DenseFit], settings: &MatchingSettings) -> bool {
@@ -314,14 +318,18 @@ impl OrderedPair {
     }
 
     fn shape_distance(&self, fits: &[DenseFit], settings: &MatchingSettings) -> ShapeDistance {
+        let mut out = ShapeDistance::default();
+        if let Some(free) = self.edit_distance(None, settings) {
+            out.structure_mm = free.upper_bound;
+            out.structure = 1.0 - free.similarity;
+        }
         let Some(best) = fits.first() else {
-            return ShapeDistance::default();
+            return out;
         };
         let (a, b) = (self.first_samples.size(), self.second_samples.size());
-        let mut out = ShapeDistance {
-            with_size_mm: best.residual,
-            ..Default::default()
-        };
+        out.with_size_mm = best.residual;
+        out.distribution_mm =
+            Signature::new(&self.first_samples).distance(&Signature::new(&self.second_samples));
         if a > 0.0 && b > 0.0 {
             let (first, second) = (self.first_samples.scaled(a), self.second_samples.scaled(b));
             let guesses: Vec<Rigid> = fits
@@ -333,12 +341,12 @@ impl OrderedPair {
                 .collect();
             let scaled = align(&first, &second, &guesses, settings.hypotheses, false);
             out.without_size = scaled.first().map_or(0.0, |f| f.residual);
+            out.distribution = Signature::new(&first).distance(&Signature::new(&second));
         }
         out
     }
 
-    fn correspondences(&self, a: &Assigned) -> Correspondences {
-        let m = &a.matched;
+    fn correspondences(&self, m: &HypergraphMatch) -> Correspondences {
         let ids = |e: &Evidence| {
             (
                 e.nodes.iter().map(|n| n.id).collect::<Vec<u32>>(),
@@ -411,98 +419,12 @@ impl OrderedPair {
         out.sort_by_key(|p| p.target);
         out
     }
-
-    /// The map as a path of priced steps from target to source.
-    fn edit(&self, a: &Assigned) -> Edit {
-        let (target, source) = if self.turned {
-            (&self.second, &self.first)
-        } else {
-            (&self.first, &self.second)
-        };
-        let found = self.correspondences(a);
-        let price = |table: &matchers::Table, t: usize, s: usize| {
-            if self.turned { table[(s, t)] } else { table[(t, s)] }
-        };
-        let mut steps = Vec::new();
-        for p in &found.nodes {
-            let t = slot(target.nodes.iter().map(|n| n.id), p.target.0);
-            let s = slot(source.nodes.iter().map(|n| n.id), p.source.0);
-            steps.push(EditOperation::DeformNode {
-                target: p.target,
-                source: p.source,
-                price: price(&a.costs.nodes, t, s),
-            });
-        }
-        for p in &found.curves {
-            let t = slot(target.curves.iter().map(|c| c.id), p.target.0);
-            let s = slot(source.curves.iter().map(|c| c.id), p.source.0);
-            steps.push(EditOperation::DeformCurve {
-                target: p.target,
-                source: p.source,
-                price: price(&a.costs.curves, t, s),
-            });
-        }
-        for p in &found.sheets {
-            let t = slot(target.sheets.iter().map(|c| c.id), p.target.0);
-            let s = slot(source.sheets.iter().map(|c| c.id), p.source.0);
-            steps.push(EditOperation::DeformSheet {
-                target: p.target,
-                source: p.source,
-                price: price(&a.costs.sheets, t, s),
-            });
-        }
-        let (gone, come) = (&found.unmatched_target, &found.unmatched_source);
-        let node = |e: &Evidence, id: NodeId| e.nodes[slot(e.nodes.iter().map(|n| n.id), id.0)].evidence;
-        let curve = |e: &Evidence, id: CurveId| e.curves[slot(e.curves.iter().map(|n| n.id), id.0)].evidence;
-        let sheet = |e: &Evidence, id: SheetId| e.sheets[slot(e.sheets.iter().map(|n| n.id), id.0)].evidence;
-        let removed_nodes = gone.nodes.iter().map(|&t| EditOperation::RemoveNode {
-            target: t,
-            price: node(target, t),
-        });
-        let removed_curves = gone.curves.iter().map(|&t| EditOperation::RemoveCurve {
-            target: t,
-            price: curve(target, t),
-        });
-        let removed_sheets = gone.sheets.iter().map(|&t| EditOperation::RemoveSheet {
-            target: t,
-            price: sheet(target, t),
-        });
-        let added_nodes = come.nodes.iter().map(|&s| EditOperation::AddNode {
-            source: s,
-            price: node(source, s),
-        });
-        let added_curves = come.curves.iter().map(|&s| EditOperation::AddCurve {
-            source: s,
-            price: curve(source, s),
-        });
-        let added_sheets = come.sheets.iter().map(|&s| EditOperation::AddSheet {
-            source: s,
-            price: sheet(source, s),
-        });
-        steps.extend(removed_nodes.chain(removed_curves).chain(removed_sheets));
-        steps.extend(added_nodes.chain(added_curves).chain(added_sheets));
-        let rest = a.matched.price - steps.iter().map(EditOperation::price).sum::<f64>();
-        if rest > 1e-9 * (1.0 + a.matched.price) {
-            steps.push(EditOperation::Rewire { price: rest });
-        }
-        Edit {
-            lower_bound: a.lower_bound,
-            upper_bound: a.matched.price,
-            exact: a.exact,
-            operations: steps,
-        }
-    }
 }
 
 /// Translation of a pose after both shapes were divided by their sizes: the same places meet at the centroid of the second.
 fn rescaled(fit: &DenseFit, second: &MedialSamples, a: f64, b: f64) -> DVec3 {
     let centroid = moments(&second.positions).centroid;
     fit.pose.apply(centroid) / a - fit.pose.linear * centroid / b
-}
-
-/// Position of an id in the list it came from.
-fn slot(mut ids: impl Iterator<Item = u32>, id: u32) -> usize {
-    ids.position(|i| i == id).expect("the id came from this list")
 }
 
 /// An order of scaffolds that does not depend on who is called target.

@@ -8,10 +8,12 @@
 //!   before the element is gone (a splice of Sebastian, Klein and Kimia 2004, priced in mm). An element at the cut weighs nothing, so that
 //!   it does not matter which side of the cut it fell on. A node has half of what meets there. A rib says little beyond its sheet,
 //!   and how ribs are split is the least stable thing of all: a quarter. Seams are a construction and carry nothing.
-//! * The **attributes**: places are known by their distance from the centroid of the scaffold, radii and lengths as they are.
+//! * The **attributes**: places are known by their distance from the centroid of the scaffold's sheets and wires, radii and lengths as they
+//!   are.
 //!
 //! Cost: linear.
 
+use super::samples::fade;
 use crate::coarse_scaffold::hypergraph::{CoarseScaffold, Curve, CurveKind, MedialPoint, NodeKind};
 use glam::DVec3;
 use matchers::{AttributedHypergraph, CurveEnds};
@@ -66,17 +68,21 @@ pub(crate) struct Evidence {
     pub(crate) nodes: Vec<NodeFacts>,
     pub(crate) curves: Vec<CurveFacts>,
     pub(crate) sheets: Vec<SheetFacts>,
+    /// Root mean square distance of the medial points from their centroid.
+    pub(crate) size_mm: f64,
 }
 
 impl Evidence {
-    /// Collects what lies above the cut; `centroid` is that of the scaffold's medial points.
-    pub(crate) fn new(scaffold: &CoarseScaffold, cut_mm: f64, centroid: DVec3) -> Self {
+    /// Collects what lies above the cut.
+    pub(crate) fn new(scaffold: &CoarseScaffold, cut_mm: f64) -> Self {
+        let (centroid, size_mm) = spread(scaffold, cut_mm);
         let above = |persistence: f64| (persistence - cut_mm).max(0.0);
         let mut out = Self {
             graph: AttributedHypergraph::new(),
             nodes: Vec::new(),
             curves: Vec::new(),
             sheets: Vec::new(),
+            size_mm,
         };
         let sound = "evidence is finite and not negative, and ends are added before what refers to them";
         let mut node_slot = vec![None; scaffold.nodes.len()];
@@ -106,8 +112,13 @@ impl Evidence {
                 [a] => CurveEnds::One(a),
                 [a, b, ..] => CurveEnds::Two(a, b),
             };
-            curve_slot[curve.id.index()] =
-                Some(out.graph.add_curve(ends, evidence, Vec::new()).expect(sound));
+            let slot = out.graph.add_curve(ends, evidence, Vec::new()).expect(sound);
+            // Its two ends must come together for the curve to become a point.
+            out.graph
+                .set_contract_price(slot, Some(curve.length))
+                .expect("a length is finite and not negative");
+            out.graph.set_class(slot, curve.kind as u32).expect(sound);
+            curve_slot[curve.id.index()] = Some(slot);
             let profile = profile(curve);
             out.curves.push(CurveFacts {
                 id: curve.id.0,
@@ -148,6 +159,39 @@ impl Evidence {
         }
         out
     }
+}
+
+/// Centroid and spread of the medial points by area, wires by half their tubes' surface; elements near the cut fade in. Sums of moments,
+/// not of samples: a place must not shift with the luck of a draw.
+fn spread(scaffold: &CoarseScaffold, cut_mm: f64) -> (DVec3, f64) {
+    let mut parts: Vec<(f64, DVec3, f64)> = scaffold
+        .sheets
+        .iter()
+        .map(|s| {
+            let around = DVec3::from_array(s.moments.deviations).length_squared();
+            (fade(s.persistence, cut_mm) * s.area, s.moments.centroid, around)
+        })
+        .collect();
+    for c in scaffold.curves.iter().filter(|c| c.kind == CurveKind::Wire) {
+        let next = c
+            .polyline
+            .iter()
+            .skip(1)
+            .chain(c.polyline.first().filter(|_| c.closed));
+        for (a, b) in c.polyline.iter().zip(next) {
+            let length = a.position.distance(b.position);
+            let weight =
+                fade(c.persistence, cut_mm) * std::f64::consts::PI * 0.5 * (a.radius + b.radius) * length;
+            parts.push((weight, a.position.midpoint(b.position), length * length / 12.0));
+        }
+    }
+    let total: f64 = parts.iter().map(|p| p.0).sum();
+    if total <= 0.0 {
+        return (DVec3::ZERO, 0.0);
+    }
+    let centroid = parts.iter().map(|p| p.1 * p.0).sum::<DVec3>() / total;
+    let squares = parts.iter().map(|p| p.0 * (p.1.distance_squared(centroid) + p.2));
+    (centroid, (squares.sum::<f64>() / total).sqrt())
 }
 
 /// Evidence of a curve, mm.

@@ -6,8 +6,10 @@
 //! |---|---|
 //! | `samples` | a scaffold as points with radii |
 //! | `moments`, `dense` | poses from those points |
+//! | `signature` | what they are like in any pose |
 //! | `evidence` | the elements above a shared cut, weighted by persistence |
 //! | `compatibility` | what two elements have in common |
+//! | `edit_path` | the way from one to the other, in words and mm |
 //! | `correspond` | the front door: assignment, edit path, distance |
 //!
 //! Bones have few nodes and one large sheet with slits, so discrete matching cannot carry a pose: dense medial points do, and the
@@ -16,14 +18,17 @@
 mod compatibility;
 mod correspond;
 mod dense;
+mod edit_path;
 mod evidence;
 pub(crate) mod moments;
 mod result;
 mod samples;
 mod settings;
+mod signature;
 
 pub use correspond::{match_scaffolds, match_scaffolds_at, pose_hypotheses};
 pub use result::{
-    Correspondences, Edit, EditOperation, Elements, Matching, Pair, PoseHypothesis, ShapeDistance,
+    Correspondences, Edit, EditElement, EditKind, EditOperation, EditSide, Elements, Matching, Pair,
+    PoseHypothesis, ShapeDistance,
 };
 pub use settings::MatchingSettings;

@@ -2,6 +2,7 @@
 
 use crate::geometry::{CurveId, NodeId, Rigid, SheetId};
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// A pair of corresponding elements.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -50,110 +51,101 @@ pub struct ShapeDistance {
     /// The same after both shapes are brought to unit size (root mean square of distance from the centroid and radius): a
     /// share of the size.
     pub without_size: f64,
-    /// Price of making one hypergraph from the other, mm of evidence: unmatched elements, changed incidences, deformations.
-    /// Continuous for a given pose; the pose of two unequal scaffolds settles to within a degree, which moves it by some
-    /// percent.
+    /// Difference of the distributions of medial points (radii, distances from the centroid and between points, deviations), mm:
+    /// needs no pose and does not see the mirror image.
+    pub distribution_mm: f64,
+    /// The same at unit size.
+    pub distribution: f64,
+    /// Price of making one hypergraph from the other by attributes alone, mm of evidence. No pose enters, so it is
+    /// continuous where the edit distance is proven; `edit` holds the path in the pose, which knows places as well.
     pub structure_mm: f64,
     /// `structure_mm` as a share of the price of having nothing in common, 0 to 1.
     pub structure: f64,
 }
 
-/// One step of the way from target to source.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", tag = "operation")]
-pub enum EditOperation {
-    /// A node changes into its counterpart.
-    DeformNode {
-        /// Node of the target.
-        target: NodeId,
-        /// Node of the source.
-        source: NodeId,
-        /// Price, mm.
-        price: f64,
-    },
-    /// A curve changes into its counterpart.
-    DeformCurve {
-        /// Curve of the target.
-        target: CurveId,
-        /// Curve of the source.
-        source: CurveId,
-        /// Price, mm.
-        price: f64,
-    },
-    /// A sheet changes into its counterpart.
-    DeformSheet {
-        /// Sheet of the target.
-        target: SheetId,
-        /// Sheet of the source.
-        source: SheetId,
-        /// Price, mm.
-        price: f64,
-    },
-    /// A node of the target goes.
-    RemoveNode {
-        /// Node of the target.
-        target: NodeId,
-        /// Price, mm.
-        price: f64,
-    },
-    /// A curve of the target goes.
-    RemoveCurve {
-        /// Curve of the target.
-        target: CurveId,
-        /// Price, mm.
-        price: f64,
-    },
-    /// A sheet of the target is spliced away: its persistence above the cut.
-    RemoveSheet {
-        /// Sheet of the target.
-        target: SheetId,
-        /// Price, mm.
-        price: f64,
-    },
-    /// A node of the source comes.
-    AddNode {
-        /// Node of the source.
-        source: NodeId,
-        /// Price, mm.
-        price: f64,
-    },
-    /// A curve of the source comes.
-    AddCurve {
-        /// Curve of the source.
-        source: CurveId,
-        /// Price, mm.
-        price: f64,
-    },
-    /// A sheet of the source comes.
-    AddSheet {
-        /// Sheet of the source.
-        source: SheetId,
-        /// Price, mm.
-        price: f64,
-    },
-    /// Ends, boundaries and corners that change between elements that stay.
-    Rewire {
-        /// Price, mm.
-        price: f64,
-    },
+/// What a step of the way does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EditKind {
+    /// An element changes into its counterpart.
+    Deform,
+    /// An element goes that the other scaffold does not have.
+    Splice,
+    /// A curve shrinks to a point; its end nodes become one.
+    Contract,
+    /// Two curves become one across a node, or two sheets across a curve.
+    Merge,
 }
 
-impl EditOperation {
-    /// Price of the step, mm.
-    pub fn price(&self) -> f64 {
-        match *self {
-            Self::DeformNode { price, .. }
-            | Self::DeformCurve { price, .. }
-            | Self::DeformSheet { price, .. }
-            | Self::RemoveNode { price, .. }
-            | Self::RemoveCurve { price, .. }
-            | Self::RemoveSheet { price, .. }
-            | Self::AddNode { price, .. }
-            | Self::AddCurve { price, .. }
-            | Self::AddSheet { price, .. }
-            | Self::Rewire { price } => price,
-        }
+/// The scaffold a step happens to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EditSide {
+    /// The target.
+    Target,
+    /// The source.
+    Source,
+}
+
+impl fmt::Display for EditSide {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Target => "target",
+            Self::Source => "source",
+        })
     }
+}
+
+/// What a step is done to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EditElement {
+    /// A node.
+    Node,
+    /// An axial curve.
+    AxialCurve,
+    /// A rib.
+    Rib,
+    /// A wire.
+    Wire,
+    /// A seam.
+    Seam,
+    /// A sheet.
+    Sheet,
+}
+
+impl fmt::Display for EditElement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Node => "node",
+            Self::AxialCurve => "axial curve",
+            Self::Rib => "rib",
+            Self::Wire => "wire",
+            Self::Seam => "seam",
+            Self::Sheet => "sheet",
+        })
+    }
+}
+
+/// One step of the way that makes target and source equal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EditOperation {
+    /// What is done.
+    pub operation: EditKind,
+    /// What it is done to; of a merge, what goes.
+    pub element: EditElement,
+    /// The scaffold it happens to; none for a deformation, which joins both.
+    pub side: Option<EditSide>,
+    /// Ids in the target: more than one for an element that was merged before.
+    pub target: Vec<u32>,
+    /// Ids in the source.
+    pub source: Vec<u32>,
+    /// Ids of the elements that become one by a contraction (nodes) or a merge (curves across a node, sheets across a curve).
+    pub joined: Vec<u32>,
+    /// Price, mm.
+    pub price: f64,
+    /// The step in words, price included.
+    pub text: String,
 }
 
 /// The way from target to source and what is known of the cheapest one.
@@ -165,7 +157,7 @@ pub struct Edit {
     pub upper_bound: f64,
     /// Both bounds meet.
     pub exact: bool,
-    /// The steps, in the order of the elements; their prices add up to the upper bound.
+    /// The steps: splices, contractions and merges, deformations; their prices add up to the upper bound.
     pub operations: Vec<EditOperation>,
 }
 

@@ -240,13 +240,15 @@ fn edit(r: &Value) -> Section {
         .push(facts_table("", &Value::Object(summary), Digits::Few));
     let operations = items(r, "edit.operations");
     if !operations.is_empty() {
-        let fields = ["operation", "target", "source", "price"];
         let mut table = Table::new(
-            "Operations from the source to the target",
-            &[":operation", "target", "source", "price"],
+            "Operations that make source and target equal",
+            &[":operation", "price [mm]"],
         );
         for o in operations {
-            table.row(fields.map(|f| shown(o, f)));
+            let words = shown(o, "text");
+            // The price has a column of its own.
+            let what = words.rsplit_once(": ").map_or(words.as_str(), |w| w.0);
+            table.row([what.to_owned(), shown(o, "price")]);
         }
         section.tables.push(table);
     }

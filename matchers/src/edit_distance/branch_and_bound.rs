@@ -269,7 +269,8 @@ impl<'a> Search<'a> {
     /// What the undecided elements contribute to the bound. Optimal duals are not unique; the mean of those that favour the
     /// target and those that favour the source is fair to both.
     fn worth(&self, open: &Open, parts: &[KindBound]) -> [[Vec<f64>; 3]; 2] {
-        let mut worth = [&self.open_target, &self.open_source].map(|o| [0, 1, 2].map(|k| vec![0.0; o[k].len()]));
+        let mut worth =
+            [&self.open_target, &self.open_source].map(|o| [0, 1, 2].map(|k| vec![0.0; o[k].len()]));
         for (k, part) in parts.iter().enumerate() {
             let turned = part.turned();
             for (r, &x) in open.rows[k].iter().enumerate() {

@@ -59,13 +59,20 @@ pub(super) struct Outcome {
 }
 
 /// Searches for answers cheaper than `known_price`; with a limit of 0 it only bounds.
-pub(super) fn search(question: &Question, known_price: f64, tolerance: f64, limit: usize) -> Result<Outcome, ProblemError> {
+pub(super) fn search(
+    question: &Question,
+    known_price: f64,
+    tolerance: f64,
+    limit: usize,
+) -> Result<Outcome, ProblemError> {
     let graphs = [question.target, question.source];
     let healable = [0, 1].map(|g| Healable::new(graphs[g], question.heals[g].clone(), question.evidence));
     let sides = graphs.map(|g| Side::new(g, question.evidence));
     let table = |f: &dyn Fn(Kind, u32, u32) -> f64| {
         Kind::ALL.map(|k| {
-            Table::from_fn(graphs[0].count(k), graphs[1].count(k), |x, y| f(k, x as u32, y as u32))
+            Table::from_fn(graphs[0].count(k), graphs[1].count(k), |x, y| {
+                f(k, x as u32, y as u32)
+            })
         })
     };
     let mut s = HealedSearch {
@@ -166,7 +173,11 @@ const ROOT_REVISIONS: usize = 12;
 /// An element is worth what it contributes to the bound, and what leaving it unmatched was granted.
 fn handed_down(bound: Bound, couplings: Couplings, best_case: &[Optimism; 2]) -> Option<Inheritance> {
     let mut worth = bound.worth?;
-    for (worth, case) in worth.iter_mut().flatten().zip(best_case.iter().flat_map(|c| &c.bonus)) {
+    for (worth, case) in worth
+        .iter_mut()
+        .flatten()
+        .zip(best_case.iter().flat_map(|c| &c.bonus))
+    {
         worth.iter_mut().zip(case).for_each(|(w, b)| *w += b);
     }
     Some(Inheritance {
@@ -234,7 +245,11 @@ impl HealedSearch<'_> {
         let costs = [0, 1, 2].map(|k| {
             let [t, s] = best_case;
             Table::from_fn(t.alone[k].len(), s.alone[k].len(), |x, y| {
-                let own = if t.alone[k][x] && s.alone[k][y] { &self.alone } else { &self.least };
+                let own = if t.alone[k][x] && s.alone[k][y] {
+                    &self.alone
+                } else {
+                    &self.least
+                };
                 own[k][(x, y)] + t.bonus[k][x] + s.bonus[k][y]
             })
         });
@@ -255,7 +270,11 @@ impl HealedSearch<'_> {
             self.healable[g].optimism(&decisions.status[g], &decisions.closed[g], &inherited.worth[g])
         });
         let problem = self.relaxed(&best_case);
-        let ceiling = self.total - best_case.iter().flat_map(|b| b.bonus.iter().flatten()).sum::<f64>();
+        let ceiling = self.total
+            - best_case
+                .iter()
+                .flat_map(|b| b.bonus.iter().flatten())
+                .sum::<f64>();
         let to_beat = ceiling - self.best_price;
         let mut search = Search::new(&problem, to_beat, 0);
         search.tolerance = self.tolerance;
@@ -274,7 +293,13 @@ impl HealedSearch<'_> {
 
     /// Closes the heals that cannot be part of an answer better than the best: taking one leaves all that it takes unmatched, and
     /// the bound falls by what those contribute to it.
-    fn close_hopeless(&self, decisions: &mut Decisions, best_case: &[Optimism; 2], bound: &Bound, at_least: f64) {
+    fn close_hopeless(
+        &self,
+        decisions: &mut Decisions,
+        best_case: &[Optimism; 2],
+        bound: &Bound,
+        at_least: f64,
+    ) {
         let Some(worth) = &bound.worth else { return };
         for g in 0..2 {
             for &h in &best_case[g].possible {
@@ -383,8 +408,13 @@ impl HealedSearch<'_> {
             let all = self.healable[g].heals();
             decisions.taken[g].iter().map(|&h| all[h].clone()).collect()
         });
-        heals.iter_mut().for_each(|l| l.sort_by(|a, b| a.price.total_cmp(&b.price)));
-        let (Some(t), Some(s)) = (healing::apply(q.target, &heals[0]), healing::apply(q.source, &heals[1])) else {
+        heals
+            .iter_mut()
+            .for_each(|l| l.sort_by(|a, b| a.price.total_cmp(&b.price)));
+        let (Some(t), Some(s)) = (
+            healing::apply(q.target, &heals[0]),
+            healing::apply(q.source, &heals[1]),
+        ) else {
             return Ok(());
         };
         self.out.heal_sets += 1;

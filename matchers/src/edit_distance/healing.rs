@@ -8,10 +8,10 @@
 //!
 //! * **contract** a curve: its two end nodes become one node; costs the curve's contract price, everything included, so that
 //!   a curve of no length costs nothing;
-//! * **merge at a node**: two curves that end there become one curve; costs what splicing the node costs, its weight and the
+//! * **merge at a node**: two curves of one class that end there become one curve; costs what splicing the node costs, its weight and the
 //!   strengths of its incidences; all other curves that end there must go (**cleared**: spliced, or removed by another heal);
-//! * **merge at a curve**: two sheets that it bounds become one sheet; costs what splicing the curve costs; all other sheets
-//!   that it bounds must go.
+//! * **merge at a curve**: two sheets that it bounds, once each, become one sheet; costs what splicing the curve costs; all other
+//!   sheets that it bounds must go.
 //!
 //! This is what a transition of a medial scaffold does around the element it removes: splicing a fin leaves its host rib in
 //! two halves, which then are one rib. The healed element weighs as much as its heaviest part. (Chang & Kimia, "Regularizing
@@ -118,8 +118,10 @@ fn merges_at_nodes(g: &AttributedHypergraph, side: &Side, heals: &mut Vec<Heal>)
         let is_loop = |c: &u32| matches!(g.curves()[*c as usize].ends, CurveEnds::Two(a, b) if a == b);
         let open: Vec<u32> = meeting.iter().copied().filter(|c| !is_loop(c)).collect();
         for (k, &c) in open.iter().enumerate() {
+            let class = |c: u32| g.curves()[c as usize].class;
             open[..k]
                 .iter()
+                .filter(|&&d| class(d) == class(c))
                 .for_each(|&d| heals.push(heal(Kind::Node, n, Kind::Curve, [c, d], &meeting, price)));
         }
     }
@@ -129,8 +131,17 @@ fn merges_at_curves(g: &AttributedHypergraph, side: &Side, heals: &mut Vec<Heal>
     for (c, curve) in g.curves().iter().enumerate() {
         let price = curve.weight + incident_strength(side, 1, c);
         let sheets: Vec<u32> = side.incidences[1].forward[c].iter().map(|i| i.element).collect();
-        for (k, &s) in sheets.iter().enumerate() {
-            sheets[..k]
+        // A slit is met by its sheet from both sides: what else meets it there cannot become one with it.
+        let times = |s: &u32| {
+            g.sheets()[*s as usize]
+                .curves
+                .iter()
+                .filter(|d| d.index() == c)
+                .count()
+        };
+        let open: Vec<u32> = sheets.iter().copied().filter(|s| times(s) == 1).collect();
+        for (k, &s) in open.iter().enumerate() {
+            open[..k]
                 .iter()
                 .for_each(|&t| heals.push(heal(Kind::Curve, c, Kind::Sheet, [s, t], &sheets, price)));
         }
@@ -273,6 +284,7 @@ fn rebuilt_graph(
             .then(|| g.curves()[list[0] as usize].contract_price)
             .flatten();
         h.set_contract_price(id, price).expect(sound);
+        h.set_class(id, g.curves()[list[0] as usize].class).expect(sound);
     }
     for list in &parts[2] {
         let mut boundary = Vec::new();

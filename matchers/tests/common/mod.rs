@@ -107,6 +107,7 @@ pub fn permuted(g: &AttributedHypergraph, rng: &mut ChaCha8Rng) -> (AttributedHy
         };
         let id = h.add_curve(ends, c.weight, c.attributes.clone()).unwrap();
         h.set_contract_price(id, c.contract_price).unwrap();
+        h.set_class(id, c.class).unwrap();
     }
     for &old in &orders[2] {
         let s = &g.sheets()[old];
@@ -181,10 +182,14 @@ pub fn edited(
         let list = attributes(Kind::Curve, x);
         let id = out.add_curve(ends, curve.weight, list).unwrap();
         out.set_contract_price(id, curve.contract_price).unwrap();
+        out.set_class(id, curve.class).unwrap();
         place[1][x] = Some(id.0);
     }
     for (x, sheet) in h.sheets().iter().enumerate().filter(|(x, _)| !gone[2][*x]) {
-        let curves = sheet.curves.iter().filter_map(|c| place[1][c.index()].map(CurveId));
+        let curves = sheet
+            .curves
+            .iter()
+            .filter_map(|c| place[1][c.index()].map(CurveId));
         let list = attributes(Kind::Sheet, x);
         let id = out.add_sheet(curves.collect(), sheet.weight, list).unwrap();
         place[2][x] = Some(id.0);
