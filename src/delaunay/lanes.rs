@@ -13,14 +13,14 @@ use glam::DVec3;
 /// A point that fills one vector register, so that one load fetches it.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(32))]
-pub(super) struct Site {
+pub(crate) struct Site {
     /// x, y, z and the position on the curve, which only several threads look at.
     pub lanes: [f64; 4],
 }
 
 impl Site {
     /// The point, at a position of the curve.
-    pub(super) fn new(p: DVec3, position: f64) -> Self {
+    pub(crate) fn new(p: DVec3, position: f64) -> Self {
         Self {
             lanes: [p.x, p.y, p.z, position],
         }
@@ -28,23 +28,23 @@ impl Site {
 
     /// The point alone.
     #[inline(always)]
-    pub(super) fn point(&self) -> DVec3 {
+    pub(crate) fn point(&self) -> DVec3 {
         let [x, y, z, _] = self.lanes;
         DVec3::new(x, y, z)
     }
 
     /// Where the point is on the curve.
     #[inline(always)]
-    pub(super) fn position(&self) -> f64 {
+    pub(crate) fn position(&self) -> f64 {
         self.lanes[3]
     }
 }
 
 /// Four corners in order.
-pub(super) type Corners<'a> = [&'a Site; 4];
+pub(crate) type Corners<'a> = [&'a Site; 4];
 
 /// How the arithmetic is done.
-pub(super) trait Lanes: Copy + Send + Sync {
+pub(crate) trait Lanes: Copy + Send + Sync {
     /// The in-sphere determinant of the corners relative to `p`, in an order of operations no deeper than Shewchuk's (stage
     /// A), and the largest lift.
     fn insphere(self, corners: Corners, p: &Site) -> (f64, f64);
@@ -52,7 +52,7 @@ pub(super) trait Lanes: Copy + Send + Sync {
 
 /// One number at a time.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Scalar;
+pub(crate) struct Scalar;
 
 impl Lanes for Scalar {
     #[inline(always)]
@@ -78,7 +78,7 @@ impl Lanes for Scalar {
 }
 
 /// Something to be compiled for the instructions at hand.
-pub(super) trait Task {
+pub(crate) trait Task {
     /// What it returns.
     type Output;
     /// Does it. Implementations are inlined into the code of the processor they run on.
@@ -87,7 +87,7 @@ pub(super) trait Task {
 
 /// Runs a task with the widest arithmetic the processor has.
 #[cfg(target_arch = "x86_64")]
-pub(super) fn with_lanes<T: Task>(task: T) -> T::Output {
+pub(crate) fn with_lanes<T: Task>(task: T) -> T::Output {
     struct Wide<T>(T, pulp::x86::V3);
     impl<T: Task> pulp::NullaryFnOnce for Wide<T> {
         type Output = T::Output;
@@ -104,14 +104,14 @@ pub(super) fn with_lanes<T: Task>(task: T) -> T::Output {
 
 /// Runs a task with the widest arithmetic the processor has.
 #[cfg(not(target_arch = "x86_64"))]
-pub(super) fn with_lanes<T: Task>(task: T) -> T::Output {
+pub(crate) fn with_lanes<T: Task>(task: T) -> T::Output {
     task.run(Scalar)
 }
 
 /// Four numbers at a time, with fused products; only made where the processor has them.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Avx(pulp::x86::V3);
+pub(crate) struct Avx(pulp::x86::V3);
 
 #[cfg(target_arch = "x86_64")]
 impl Lanes for Avx {

@@ -13,7 +13,7 @@ mod canonical;
 pub mod door;
 mod filter;
 mod insertion;
-mod lanes;
+pub(crate) mod lanes;
 mod order;
 mod parallel;
 mod star;

@@ -2,6 +2,7 @@
 //! 2007), read off the Delaunay triangulation.
 
 pub mod flow;
+mod four;
 pub mod merged;
 pub mod planar;
 pub mod scaffold;

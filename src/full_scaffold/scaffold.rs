@@ -13,8 +13,9 @@
 use super::flow::{CriticalCounts, FlowType};
 use super::merged::{DegenerateVertex, degenerate_vertices};
 use super::planar::{self, PlanarScaffold};
-use super::spheres::{TetGeometry, tet_geometry};
+use super::spheres::{Geometries, Signs};
 use crate::delaunay::door::Frame;
+use crate::delaunay::lanes::with_lanes;
 use crate::delaunay::{DelaunayError, Facet, Triangulation};
 use crate::geometry::fixed::Grid;
 use crate::geometry::{Sphere, TetId};
@@ -226,22 +227,27 @@ pub fn full_scaffold(t: &Triangulation) -> Result<FullScaffold, DelaunayError> {
         return planar::flat_scaffold(t, &points);
     }
     let grid = Grid::new(points.iter().fold(0.0, |m, p| p.abs().max_element().max(m)));
-    let (mut spheres, mut signs): (Vec<Sphere>, Vec<Signs>) = (Vec::new(), Vec::new());
-    (0..t.num_finite() as u32)
-        .into_par_iter()
-        .map(|i| {
-            let g: TetGeometry = tet_geometry(t, &points, grid, TetId(i));
-            let sphere = Sphere {
-                centre: g.sphere.centre.to_array().map(|v| frame.restore(v)).into(),
-                radius: frame.restore(g.sphere.radius),
-            };
-            let signs = Signs {
-                signs: g.outside | g.cospherical << 4,
-                obtuse: g.obtuse,
-            };
-            (sphere, signs)
-        })
-        .unzip_into_vecs(&mut spheres, &mut signs);
+    let nowhere = Sphere {
+        centre: DVec3::ZERO,
+        radius: 0.0,
+    };
+    let mut spheres = vec![nowhere; t.num_finite()];
+    let mut signs = vec![Signs::default(); t.num_finite()];
+    let chunks = spheres.par_chunks_mut(CHUNK).zip(signs.par_chunks_mut(CHUNK));
+    chunks.enumerate().for_each(|(i, (spheres, signs))| {
+        with_lanes(Geometries {
+            t,
+            points: &points,
+            grid,
+            first: (i * CHUNK) as u32,
+            spheres: &mut *spheres,
+            signs,
+        });
+        for sphere in spheres.iter_mut().filter(|_| frame.exponent != 0) {
+            sphere.centre = sphere.centre.to_array().map(|v| frame.restore(v)).into();
+            sphere.radius = frame.restore(sphere.radius);
+        }
+    });
     tell_both_sides(t, &mut signs);
     let mut flows = vec![0; signs.len()];
     let mut counts = classify(t, &signs, &mut flows);
@@ -262,15 +268,6 @@ pub fn full_scaffold(t: &Triangulation) -> Result<FullScaffold, DelaunayError> {
     };
     out.degenerate = degenerate_vertices(t, &out);
     Ok(out)
-}
-
-/// What step 1 finds for one tetrahedron.
-#[derive(Clone, Copy, Debug)]
-struct Signs {
-    /// As in [`FullScaffold::signs`].
-    signs: u8,
-    /// As in [`TetGeometry::obtuse`].
-    obtuse: u16,
 }
 
 /// Copies the bits of coinciding spheres from the owners of facets to the other sides. Few clouds have any.

@@ -19,7 +19,7 @@ pub struct Sphere {
 
 /// Smallest ratio of numerator and denominator to the products of lengths that bound their terms at which the plain solve is
 /// kept. Neither has more than 17 roundings, so the quotient's relative error stays below `2 * 17 * 2^-53 * 2^14 = 6e-11`.
-const WELL_CONDITIONED: f64 = 1.0 / 16384.0;
+pub(crate) const WELL_CONDITIONED: f64 = 1.0 / 16384.0;
 
 /// The sphere through the corners of a tetrahedron of non-zero volume (either orientation).
 ///
