@@ -339,26 +339,23 @@ impl Task for Part<'_, '_> {
     }
 }
 
-/// Makes every word atomic and adds room. The arrays are converted in place.
+/// Makes every word atomic and adds room. What is there is converted in place; the room is touched for the first time here,
+/// by all threads.
 fn share(plain: Plain, room: usize) -> Shared {
-    let Plain {
-        mut vertices,
-        mut neighbours,
-        ..
-    } = plain;
-    let used = vertices.len();
-    let room = room.max(used);
-    vertices.resize(room, NOTHING);
-    neighbours.resize(room, [0; 4]);
-    let atomic = |words: Vec<[u32; 4]>| {
-        words
+    let used = plain.vertices.len();
+    let more = room.saturating_sub(used);
+    let atomic = |words: Vec<[u32; 4]>, blank: [u32; 4]| {
+        let mut words: Vec<[AtomicU32; 4]> = words
             .into_iter()
             .map(|[a, b, c, d]| [a, b, c, d].map(AtomicU32::new))
-            .collect()
+            .collect();
+        words.reserve_exact(more);
+        words.par_extend((0..more).into_par_iter().map(|_| blank.map(AtomicU32::new)));
+        words
     };
     Shared {
-        vertices: atomic(vertices),
-        neighbours: atomic(neighbours),
+        vertices: atomic(plain.vertices, NOTHING),
+        neighbours: atomic(plain.neighbours, [0; 4]),
         next: AtomicU32::new(used as u32),
         full: AtomicBool::new(false),
     }
