@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! cargo run --release --example segregation_table -- --n 10000 --seeds 3 --noise 0,0.05,0.1,0.25,0.5,0.75
-//!     [--shapes torus,bunny] [--density 20] [--outliers 0.05] [--verbose] [--rows] [--no-second]
+//!     [--shapes torus,bunny] [--density 20] [--outliers 0.05] [--verbose] [--rows] [--no-second] [--closed]
+//! cargo run --release --example segregation_table -- --n 10000 --all-meshes [--verbose]
 //! ```
 //! "Right": closed, no open or non-manifold edge or vertex, the true Euler number and number of components. Distances are
 //! in mean spacings `sqrt(area / n)` against the true mesh, both ways. Real shapes are read from `../shared/data` (or
@@ -11,10 +12,10 @@
 #[path = "../tests/segregation_support/mod.rs"]
 mod support;
 
-use medial_scaffold::geometry::{ClosestOnMesh, TriangleMesh};
+use medial_scaffold::geometry::TriangleMesh;
 use medial_scaffold::segregation::{ClosedOrOpen, CloudSegregation, SegregationSettings, segregate_cloud};
 use std::time::Instant;
-use support::{corrupted, data_shape, shapes};
+use support::{all_shapes, corrupted};
 
 struct Options {
     n: usize,
@@ -46,6 +47,9 @@ struct Row {
 
 fn main() {
     let options = parse();
+    if std::env::args().any(|a| a == "--all-meshes") {
+        return all_meshes(&options);
+    }
     println!(
         "n {} seeds {} density 1:{} outliers {}",
         options.n, options.seeds, options.density, options.outliers
@@ -53,23 +57,8 @@ fn main() {
     println!(
         "noise  right right+near runs | hausdorff med p95 max | mean | vol % med max | off % max | open bad | noise read min max | flagged wrong, flagged right | s med"
     );
-    let truths: Vec<(String, TriangleMesh)> = shapes()
+    let truths: Vec<(String, TriangleMesh)> = all_shapes()
         .into_iter()
-        .chain(
-            [
-                ("fandisk", "generic_mixed_localonly/fandisk.off"),
-                ("bunny", "generic_mixed_localonly/bunny.off"),
-                ("rocker", "generic_mixed_localonly/rocker-arm.obj"),
-                ("hand", "generic_mixed_localonly/hand.off"),
-                (
-                    "calcaneus",
-                    "tarsal_visiblehuman_ccby4/VHF_Right/VHF_Right_Bone_Calcaneous_smooth.stl",
-                ),
-                ("capitate", "carpal_myosim_apache2/frameB/capitate.stl"),
-            ]
-            .into_iter()
-            .filter_map(|(name, path)| Some((name.to_owned(), data_shape(path)?))),
-        )
         .filter(|(name, _)| options.shapes.is_empty() || options.shapes.contains(name))
         .collect();
     for &noise in &options.noise {
@@ -194,45 +183,79 @@ fn run(name: &str, truth: &TriangleMesh, noise: f64, seed: u64, options: &Option
 
 fn judge(result: &CloudSegregation, truth: &TriangleMesh, spacing: f64, noise: f64, seconds: f64) -> Row {
     let topology = &result.report.topology;
-    let wanted = truth.topology();
     let surface = result.segregation.surface(&result.triangulation);
-    let to_truth = ClosestOnMesh::new(truth).expect("the truth has triangles");
-    let mut distances: Vec<f64> = surface
-        .triangles
-        .iter()
-        .flat_map(|t| {
-            let [a, b, c] = t.map(|i| surface.points[i as usize]);
-            [a, (a + b + c) / 3.0, 0.5 * (a + b), 0.5 * (b + c)]
-        })
-        .map(|p| to_truth.closest(p).distance2.sqrt())
-        .collect();
-    if let Some(to_surface) = ClosestOnMesh::new(&surface) {
-        distances.extend(
-            support::sample(truth, 40_000, 99)
-                .iter()
-                .map(|&p| to_surface.closest(p).distance2.sqrt()),
-        );
-    }
-    let hausdorff = distances.iter().copied().fold(0.0, f64::max) / spacing;
-    let mean = distances.iter().sum::<f64>() / distances.len().max(1) as f64 / spacing;
-    let volume = truth.signed_volume();
-    let right = topology.watertight
-        && topology.nonmanifold_vertices == 0
-        && topology.euler == wanted.euler
-        && topology.components == wanted.components;
+    let v = support::judge(&surface, truth, spacing);
     Row {
-        right,
-        near: hausdorff <= if noise > 0.25 { 3.0 * noise + 2.0 } else { 2.0 },
+        right: v.right,
+        near: v.hausdorff <= if noise > 0.25 { 3.0 * noise + 2.0 } else { 2.0 },
         flagged: result.report.doubtful(),
-        hausdorff,
-        mean,
-        volume_error: 100.0 * (surface.signed_volume() - volume) / volume,
+        hausdorff: v.hausdorff,
+        mean: v.mean,
+        volume_error: v.volume_error,
         off: 100.0 * result.report.closing.off_share,
         open_edges: topology.boundary_edges,
         bad: topology.nonmanifold_edges + topology.nonmanifold_vertices,
         noise: result.report.prepare.noise_over_spacing,
         seconds,
     }
+}
+
+/// Every closed mesh of the data folder, one component at a time (the largest), re-sampled at random without noise.
+fn all_meshes(options: &Options) {
+    let Some(root) = support::data() else {
+        println!("skipped: no folder of real shapes (set MEDIAL_DATA)");
+        return;
+    };
+    let mut files = Vec::new();
+    let mut folders = vec![root.clone()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            let path = entry.path();
+            match path.extension().and_then(|e| e.to_str()) {
+                _ if path.is_dir() => folders.push(path),
+                Some("stl" | "ply" | "off" | "obj" | "mesh") => files.push(path),
+                _ => {}
+            }
+        }
+    }
+    files.sort();
+    let (mut right, mut flagged, mut runs) = (0, 0, 0);
+    for path in files {
+        use medial_scaffold::input::{Geometry, ReadSettings, read_shape};
+        let Ok(shape) = read_shape(&path, &ReadSettings::default()) else {
+            continue;
+        };
+        let Geometry::Mesh(mesh) = shape.geometry else {
+            continue;
+        };
+        let parts = mesh.components();
+        let Some(largest) = parts.iter().max_by_key(|c| c.len()) else {
+            continue;
+        };
+        let truth = mesh.submesh(largest);
+        let wanted = truth.topology();
+        let name = path.strip_prefix(&root).unwrap_or(&path).display().to_string();
+        if !(wanted.watertight && wanted.oriented && wanted.nonmanifold_vertices == 0) {
+            println!("  {name}: not a closed manifold, left out");
+            continue;
+        }
+        let row = run(&name, &truth, 0.0, options.first_seed, options);
+        right += usize::from(row.right);
+        flagged += usize::from(!row.right && row.flagged);
+        runs += 1;
+        println!(
+            "{name}: true Euler {} {} H {:.2} volume {:+.3} %{}",
+            wanted.euler,
+            if row.right { "right" } else { "WRONG" },
+            row.hausdorff,
+            row.volume_error,
+            if row.flagged { " doubted" } else { "" }
+        );
+    }
+    println!(
+        "{right} of {runs} right; {flagged} of {} wrong ones say so",
+        runs - right
+    );
 }
 
 fn summary(noise: f64, rows: &[Row]) {

@@ -12,16 +12,17 @@
 //!
 //! Cost: `O(n log n)` in practice.
 
+use super::balls::Balls;
 use super::closure::{Closure, ClosureSettings, close, close_without_off, preset_facets};
 use super::error::SegregationError;
-use super::gap_transforms::CostRule;
+use super::gap_transforms::{CostRule, gap_transforms};
 use super::labels::{Segregation, boundary_triangles};
 use super::openness::{area_share, patches, rims, unsupported};
 use super::orient::orient;
 use super::prepare::{Cleaned, Prepared, clean, thin_out};
 use super::report::{ClosingReport, CloudReport, ComponentReport, Decision, SecondOpinion, Variation};
 use super::self_check::{doubts, pull_opinions, self_check};
-use crate::delaunay::Triangulation;
+use crate::delaunay::{Facet, Triangulation};
 use crate::geometry::{Neighbours, TriangleMesh, VertexId};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -397,7 +398,7 @@ fn finish(
             warnings: Vec::new(),
         }
     } else {
-        open_surface(&closure)
+        open_surface(&closure, !known.is_empty(), settings.cost)
     };
     report.decision = decision;
     if segregation.closed {
@@ -496,13 +497,48 @@ fn decide(share: f64, nothing_inside: bool, settings: &SegregationSettings) -> D
     }
 }
 
-fn open_surface(closure: &Closure) -> Segregation {
-    let triangles: Vec<[u32; 3]> = closure
-        .greedy
-        .facets
+/// How much larger than the least of its neighbours a spacing may be by chance.
+const SCATTER: f64 = 1.25;
+
+/// Spacings taken down to what the neighbours have: at a rim half of a point's neighbours are missing, which makes the
+/// spacing there look up to twice as large, enough to join two sheets round their rims.
+fn spacing_at_rims(triangles: &[[u32; 3]], spacing_mm: &[f64]) -> Vec<f64> {
+    let mut least = spacing_mm.to_vec();
+    for _ in 0..2 {
+        let before = least.clone();
+        for t in triangles {
+            let m = t
+                .iter()
+                .map(|&v| before[v as usize])
+                .fold(f64::INFINITY, f64::min);
+            for &v in t {
+                least[v as usize] = least[v as usize].min(m);
+            }
+        }
+    }
+    least
         .iter()
-        .map(|&f| super::labels::smallest_first(closure.triangulation.facet_vertices(f)).map(|v| v.0))
-        .collect();
+        .zip(spacing_mm)
+        .map(|(l, s)| (SCATTER * l).min(*s))
+        .collect()
+}
+
+/// The greedy surface; found once more with the spacing at its rims put right, unless triangles were given.
+fn open_surface(closure: &Closure, given: bool, cost: CostRule) -> Segregation {
+    let triangulation = &closure.triangulation;
+    let corners = |facets: &[Facet]| -> Vec<[u32; 3]> {
+        facets
+            .iter()
+            .map(|&f| super::labels::smallest_first(triangulation.facet_vertices(f)).map(|v| v.0))
+            .collect()
+    };
+    let mut triangles = corners(&closure.greedy.facets);
+    if !given {
+        let spacing = spacing_at_rims(&triangles, &closure.spacing_mm);
+        let balls = Balls::new(triangulation);
+        let again = gap_transforms(triangulation, &balls, &closure.depths, &spacing, cost, &[]);
+        triangles = corners(&again.facets);
+    }
     let oriented = orient(&closure.triangulation.points, &triangles);
     let mut warnings = Vec::new();
     if !oriented.orientable {

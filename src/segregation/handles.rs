@@ -213,8 +213,15 @@ impl Ball {
         self.borders_meet_outside(surface).then_some(rings)
     }
 
-    /// Grows ring by ring; stops with the ring after which the triangles are no disk.
+    /// The first ring after which the triangles are no disk. When they are one after the last ring no shorter loop can be
+    /// one that does not bound, so the rings before are looked at only when they are not.
     fn first_not_a_disk(&mut self, surface: &Surface, v: u32, most: u32) -> Option<u32> {
+        self.grow(surface, v, most, most)?;
+        self.grow(surface, v, 1, most)
+    }
+
+    /// Grows ring by ring to `most`; stops with the first ring from `from` on after which the triangles are no disk.
+    fn grow(&mut self, surface: &Surface, v: u32, from: u32, most: u32) -> Option<u32> {
         self.clear();
         self.vertices.push(v);
         self.vertex_seen[v as usize] = true;
@@ -225,7 +232,7 @@ impl Ball {
                 self.take_star(surface, self.vertices[at], ring + 1);
                 at += 1;
             }
-            if ring > 0 && self.euler(surface) != 1 {
+            if ring >= from && self.euler(surface) != 1 {
                 return Some(ring);
             }
         }

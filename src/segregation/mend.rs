@@ -7,18 +7,21 @@
 //!    closing would have to invent, and the holes of a closed one are filled from the tetrahedra between its points.
 //! 2. Each connected patch of new triangles whose border is made of rims alone is grafted onto the mesh as it was given, so
 //!    that triangles which are no Delaunay facets stay too.
-//! 3. When rims are left after that (rims that touch, faces that cross, edges with three faces) the whole segregated surface
-//!    is taken instead, and every triangle that it replaces is listed.
+//! 3. A rim left after that, when it is one simple loop, is closed by its triangulation of least area (Barequet & Sharir
+//!    1995), found by dynamic programming.
+//! 4. When rims are still left (rims that touch, faces that cross, edges with three faces) the whole segregated surface is
+//!    taken instead, and every triangle that it replaces is listed.
 //!
 //! Cost: as for a cloud of its points.
 
 use super::cloud::SegregationSettings;
 use super::error::SegregationError;
 use super::mesh_repair::{ChangeKind, MeshRepairReport, segregate_mesh};
-use super::openness::open_edges;
+use super::openness::{area, open_edges};
 use super::report::CloudReport;
 use crate::geometry::TriangleMesh;
 use crate::geometry::mesh::DisjointSets;
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -151,7 +154,11 @@ pub fn mend(mesh: &TriangleMesh, settings: &SegregationSettings) -> Result<Mende
         .iter()
         .map(|t| t.map(|v| found.cloud.source[v.index()]))
         .collect();
-    let grafted = graft(mesh, &surface);
+    let mut grafted = graft(mesh, &surface);
+    for rim in simple_rims(&grafted.triangles) {
+        let patch = least_area(&grafted.points, &rim);
+        grafted.triangles.extend(patch);
+    }
     let after = grafted.topology();
     if after.watertight && after.nonmanifold_vertices <= before.nonmanifold_vertices {
         let added = grafted.triangles.len() - mesh.triangles.len();
@@ -163,6 +170,69 @@ pub fn mend(mesh: &TriangleMesh, settings: &SegregationSettings) -> Result<Mende
         out.mending = Mending::Rebuilt;
     }
     Ok(out)
+}
+
+/// Longest rim that is triangulated by dynamic programming, which takes the cube of its length.
+const LONGEST_RIM: usize = 300;
+
+/// Rims that are simple loops, each in the direction in which a patch must run.
+fn simple_rims(triangles: &[[u32; 3]]) -> Vec<Vec<u32>> {
+    let open: BTreeSet<(u32, u32)> = open_edges(triangles).into_iter().collect();
+    let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for t in triangles {
+        for (a, b) in edges(*t) {
+            if open.contains(&sorted_edge((a, b))) {
+                next.entry(b).or_default().push(a);
+            }
+        }
+    }
+    let mut out = Vec::new();
+    let mut seen: BTreeSet<u32> = BTreeSet::new();
+    for &start in next.keys() {
+        let mut rim = Vec::new();
+        let mut at = start;
+        while seen.insert(at) {
+            rim.push(at);
+            match next.get(&at).map(Vec::as_slice) {
+                Some([one]) => at = *one,
+                _ => break,
+            }
+        }
+        if at == start && (3..=LONGEST_RIM).contains(&rim.len()) {
+            out.push(rim);
+        }
+    }
+    out
+}
+
+/// The triangulation of a loop with the least area.
+fn least_area(points: &[DVec3], rim: &[u32]) -> Vec<[u32; 3]> {
+    let n = rim.len();
+    let at = |i: usize, j: usize| i * n + j;
+    let mut cost = vec![0.0f64; n * n];
+    let mut split = vec![0usize; n * n];
+    for width in 2..n {
+        for i in 0..n - width {
+            let j = i + width;
+            cost[at(i, j)] = f64::INFINITY;
+            for k in i + 1..j {
+                let c = cost[at(i, k)] + cost[at(k, j)] + area(points, [rim[i], rim[k], rim[j]]);
+                if c < cost[at(i, j)] {
+                    (cost[at(i, j)], split[at(i, j)]) = (c, k);
+                }
+            }
+        }
+    }
+    let mut out = Vec::with_capacity(n - 2);
+    let mut stack = vec![(0, n - 1)];
+    while let Some((i, j)) = stack.pop() {
+        if j > i + 1 {
+            let k = split[at(i, j)];
+            out.push([rim[i], rim[k], rim[j]]);
+            stack.extend([(i, k), (k, j)]);
+        }
+    }
+    out
 }
 
 fn kept_all(mesh: &TriangleMesh, added: usize) -> MeshRepairReport {

@@ -286,3 +286,75 @@ pub fn corrupted(
     }
     points
 }
+
+/// A mesh against the truth; distances in spacings.
+pub struct Verdict {
+    /// Closed, no bad edge or vertex, the true Euler number and components.
+    pub right: bool,
+    pub hausdorff: f64,
+    pub mean: f64,
+    /// Per cent; NaN for an open mesh.
+    pub volume_error: f64,
+    pub open_edges: usize,
+}
+
+/// Judges a mesh; distances are measured both ways, over its vertices, centroids and mid-edges and over points of the truth.
+pub fn judge(surface: &TriangleMesh, truth: &TriangleMesh, spacing: f64) -> Verdict {
+    use medial_scaffold::geometry::ClosestOnMesh;
+    let (topology, wanted) = (surface.topology(), truth.topology());
+    let to_truth = ClosestOnMesh::new(truth).expect("the truth has triangles");
+    let mut distances: Vec<f64> = surface
+        .triangles
+        .iter()
+        .flat_map(|t| {
+            let [a, b, c] = t.map(|i| surface.points[i as usize]);
+            [a, (a + b + c) / 3.0, 0.5 * (a + b), 0.5 * (b + c)]
+        })
+        .map(|p| to_truth.closest(p).distance2.sqrt())
+        .collect();
+    if let Some(to_surface) = ClosestOnMesh::new(surface) {
+        let n = (4 * surface.points.len()).min(40_000);
+        distances.extend(
+            sample(truth, n, 99)
+                .iter()
+                .map(|&p| to_surface.closest(p).distance2.sqrt()),
+        );
+    }
+    let volume = truth.signed_volume();
+    Verdict {
+        right: topology.watertight
+            && topology.nonmanifold_vertices == 0
+            && topology.euler == wanted.euler
+            && topology.components == wanted.components,
+        hausdorff: distances.iter().copied().fold(0.0, f64::max) / spacing,
+        mean: distances.iter().sum::<f64>() / distances.len().max(1) as f64 / spacing,
+        volume_error: if topology.watertight {
+            100.0 * (surface.signed_volume().abs() - volume) / volume
+        } else {
+            f64::NAN
+        },
+        open_edges: topology.boundary_edges,
+    }
+}
+
+/// The synthetic shapes, and the real ones that are there.
+pub fn all_shapes() -> Vec<(String, TriangleMesh)> {
+    let real = [
+        ("fandisk", "generic_mixed_localonly/fandisk.off"),
+        ("bunny", "generic_mixed_localonly/bunny.off"),
+        ("rocker", "generic_mixed_localonly/rocker-arm.obj"),
+        ("hand", "generic_mixed_localonly/hand.off"),
+        (
+            "calcaneus",
+            "tarsal_visiblehuman_ccby4/VHF_Right/VHF_Right_Bone_Calcaneous_smooth.stl",
+        ),
+        ("capitate", "carpal_myosim_apache2/frameB/capitate.stl"),
+    ];
+    shapes()
+        .into_iter()
+        .chain(
+            real.into_iter()
+                .filter_map(|(name, path)| Some((name.to_owned(), data_shape(path)?))),
+        )
+        .collect()
+}
