@@ -5,6 +5,8 @@
 //! cargo run --release --example regularisation_table -- bones [points]
 //! cargo run --release --example regularisation_table -- speed [points]
 //! cargo run --release --example regularisation_table -- draw SHAPE_OR_FILE points tolerance picture.png
+//! cargo run --release --example regularisation_table -- list SHAPE_OR_FILE points seed
+//! cargo run --release --example regularisation_table -- pairs FILE points
 //! ```
 //! Real shapes are looked for in `../shared/data` (or `MEDIAL_DATA`).
 
@@ -26,7 +28,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         Some("bones") => bone_table(word(1).unwrap_or("20000").parse()?),
         Some("speed") => speed_table(word(1).unwrap_or("100000").parse()?),
         Some("draw") if arguments.len() == 5 => draw(&arguments[1..]),
-        _ => Err("say analytic, bones, speed, or draw SHAPE points tolerance picture.png".into()),
+        Some("list") if arguments.len() == 4 => list(&arguments[1..]),
+        Some("pairs") if arguments.len() == 3 => pairs(&arguments[1..]),
+        _ => Err(
+            "say analytic, bones, speed, draw SHAPE points tolerance picture.png, or list SHAPE points seed"
+                .into(),
+        ),
     }
 }
 
@@ -198,15 +205,7 @@ fn axial(s: &CoarseScaffold) -> impl Iterator<Item = &Curve> {
 /// Least change of persistence (absolute logarithm) among the axial curves in the same place, when below 0.35.
 fn found_again(curve: &Curve, other: &CoarseScaffold, near: f64) -> Option<f64> {
     axial(other)
-        .filter(|c| {
-            let there = Neighbours::new(&c.polyline.iter().map(|p| p.position).collect::<Vec<_>>());
-            let sum: f64 = curve
-                .polyline
-                .iter()
-                .filter_map(|p| there.nearest(p.position).map(|n| n.distance2.sqrt()))
-                .sum();
-            sum / curve.polyline.len() as f64 <= near
-        })
+        .filter(|c| distance_along(curve, c) <= near)
         .map(|c| (c.persistence / curve.persistence).ln().abs())
         .filter(|r| *r < 0.35)
         .min_by(f64::total_cmp)
@@ -314,16 +313,126 @@ fn speed_table(n: usize) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn draw(words: &[String]) -> Result<(), Box<dyn Error>> {
-    let n: usize = words[1].parse()?;
-    let (mesh, points) = match analytic(&words[0]) {
-        Some(shape) => (mesh_of(&shape, 40_000), shape.sample_poisson(n, 1).points),
+/// A synthetic shape by name or a mesh by file, with points on it.
+fn shape_or_file(word: &str, n: usize, seed: u64) -> Result<(TriangleMesh, Vec<DVec3>), Box<dyn Error>> {
+    Ok(match analytic(word) {
+        Some(shape) => (mesh_of(&shape, 40_000), shape.sample_poisson(n, seed).points),
         None => {
-            let mesh = read_mesh(Path::new(&words[0]))?;
-            let points = sample(&mesh, n, 1);
+            let mesh = read_mesh(Path::new(word))?;
+            let points = sample(&mesh, n, seed);
             (mesh, points)
         }
-    };
+    })
+}
+
+/// Every element of one scaffold at 1 % of the diagonal, lengths in tolerances.
+fn list(words: &[String]) -> Result<(), Box<dyn Error>> {
+    let (mesh, points) = shape_or_file(&words[0], words[1].parse()?, words[2].parse()?)?;
+    let r = run(&points, &mesh, &settings(Length::PercentDiagonal(1.0)))?;
+    let tau = r.coarse.tolerance_mm;
+    for s in &r.coarse.sheets {
+        println!(
+            "sheet {:2} persistence {:6.2} area {:8.2} radius {:6.2} at {:.2} boundary {:?}",
+            s.id.0,
+            s.persistence / tau,
+            s.area / tau / tau,
+            s.max_radius / tau,
+            s.moments.centroid / tau,
+            s.boundary
+                .iter()
+                .map(|b| b.iter().map(|c| c.0).collect::<Vec<_>>())
+                .collect::<Vec<_>>()
+        );
+    }
+    for c in &r.coarse.curves {
+        println!(
+            "curve {:2} {:5} persistence {:6.2} length {:6.2} nodes {:?} sheets {:?} radius {:.2} to {:.2} at {:.1}",
+            c.id.0,
+            format!("{:?}", c.kind),
+            c.persistence / tau,
+            c.length / tau,
+            c.nodes.iter().map(|n| n.0).collect::<Vec<_>>(),
+            c.sheets.iter().map(|s| s.0).collect::<Vec<_>>(),
+            c.polyline.first().map_or(0.0, |p| p.radius) / tau,
+            c.polyline.last().map_or(0.0, |p| p.radius) / tau,
+            c.polyline
+                .get(c.polyline.len() / 2)
+                .map_or(DVec3::ZERO, |p| p.position)
+                / tau,
+        );
+    }
+    for t in r.regularised.history.iter().filter(|t| t.cost_mm > 0.5 * tau) {
+        println!(
+            "{:?} cost {:.2} applied {} at {:.1}",
+            t.kind,
+            t.cost_mm / tau,
+            t.applied,
+            t.position / tau
+        );
+    }
+    for t in &r.coarse.transforms {
+        println!("{:?} cost {:.2} applied {}", t.kind, t.cost_mm / tau, t.applied);
+    }
+    println!(
+        "fidelity {:.2} spacing {:.2}",
+        r.regularised.fidelity.max_tolerances,
+        r.fine.scale.spacing_mm / tau
+    );
+    Ok(())
+}
+
+/// The axial curves of two samplings of one shape that have no counterpart in the other, and how the others differ.
+fn pairs(words: &[String]) -> Result<(), Box<dyn Error>> {
+    let n: usize = words[1].parse()?;
+    let mesh = read_mesh(Path::new(&words[0]))?;
+    let one = settings(Length::PercentDiagonal(1.0));
+    let a = run(&sample(&mesh, n, 1), &mesh, &one)?;
+    let b = run(&sample(&mesh, n, 2), &mesh, &one)?;
+    let tau = a.coarse.tolerance_mm;
+    for (name, from, to) in [("first", &a, &b), ("second", &b, &a)] {
+        for c in axial(&from.coarse) {
+            let far = axial(&to.coarse)
+                .map(|d| distance_along(c, d) / tau)
+                .fold(f64::INFINITY, f64::min);
+            println!(
+                "{name} curve {:2} persistence {:5.2} length {:6.2} sheets {:?} nodes {:?} radius {:.1} to {:.1}: nearest {far:.2}{}",
+                c.id.0,
+                c.persistence / tau,
+                c.length / tau,
+                c.sheets.iter().map(|s| s.0).collect::<Vec<_>>(),
+                c.nodes.iter().map(|n| n.0).collect::<Vec<_>>(),
+                c.polyline.first().map_or(0.0, |p| p.radius) / tau,
+                c.polyline.last().map_or(0.0, |p| p.radius) / tau,
+                if far > 1.5 { "  <-- only here" } else { "" }
+            );
+        }
+        for e in from.regularised.history.iter().chain(&from.coarse.transforms) {
+            if !e.applied {
+                println!(
+                    "   refused {:?} at cost {:.2} {:.1}",
+                    e.kind,
+                    e.cost_mm / tau,
+                    e.position / tau
+                );
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Mean distance from the points of a curve to those of another.
+fn distance_along(curve: &Curve, other: &Curve) -> f64 {
+    let there = Neighbours::new(&other.polyline.iter().map(|p| p.position).collect::<Vec<_>>());
+    let sum: f64 = curve
+        .polyline
+        .iter()
+        .filter_map(|p| there.nearest(p.position).map(|n| n.distance2.sqrt()))
+        .sum();
+    sum / curve.polyline.len() as f64
+}
+
+fn draw(words: &[String]) -> Result<(), Box<dyn Error>> {
+    let (mesh, points) = shape_or_file(&words[0], words[1].parse()?, 1)?;
     let r = run(&points, &mesh, &settings(words[2].parse()?))?;
     let bounds = mesh.bounds().ok_or("an empty mesh")?;
     let size = bounds[1] - bounds[0];

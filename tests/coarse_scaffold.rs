@@ -84,6 +84,32 @@ fn box_and_prism_have_the_counts_derived_by_hand() {
 }
 
 #[test]
+fn junctions_and_swellings_of_tubes_leave_wires_only() {
+    let y = scaffold(&shapes::y_of_capsules(1.0, 0.25), 10_000, 1);
+    assert_eq!(counts(&y), [0, 0, 0, 3, 4]);
+    let centre = y
+        .nodes
+        .iter()
+        .find(|n| n.curves.len() == 3)
+        .expect("the three wires meet in one node");
+    assert!(centre.position.length() <= y.tolerance_mm);
+    check_references(&y);
+    let d = scaffold(&shapes::dumbbell(2.0, 0.5, 0.2), 10_000, 1);
+    assert_eq!(counts(&d), [0, 0, 0, 1, 2]);
+    check_references(&d);
+}
+
+#[test]
+fn concave_edges_and_corners_held_by_a_single_ball_make_no_elements() {
+    let l = scaffold(&shapes::l_block(2.0, 0.8, 0.5), 10_000, 2);
+    assert_eq!(counts(&l), [16, 15, 15, 0, 15]);
+    check_references(&l);
+    let slab = scaffold(&shapes::slab(0.3), 10_000, 2);
+    assert_eq!(counts(&slab), [1, 0, 1, 0, 0]);
+    check_references(&slab);
+}
+
+#[test]
 fn the_generator_map_is_total_and_shares_add_up() {
     let s = scaffold(&shapes::box_shape(1.0, 1.4, 2.0), 5000, 2);
     assert!(s.fine.generator_host.iter().all(|h| *h != Host::Absent));

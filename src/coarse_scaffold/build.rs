@@ -12,6 +12,7 @@
 //! Cost `O(n log n)`.
 
 use super::attributes;
+use super::contract::{contract, thickest};
 use super::generators::generator_hosts;
 use super::hypergraph::{CoarseScaffold, Curve, CurveKind, FineLinks, MedialPoint, Node, NodeKind, Sheet};
 use super::natural::natural_tolerances;
@@ -35,7 +36,7 @@ pub fn coarse_scaffold(
 ) -> CoarseScaffold {
     let mut network = Network::new(fine, regularised);
     let tau = regularised.tolerance_mm;
-    network.contract(settings.contract_seam * tau, settings.contract_curve * tau);
+    contract(&mut network, settings);
     let node_vertices = network.nodes();
     let mut node_of_vertex = vec![NONE; fine.num_vertices()];
     for (i, vertices) in node_vertices.iter().enumerate() {
@@ -85,7 +86,7 @@ pub fn coarse_scaffold(
         .enumerate()
         .map(|(i, ((chain, sheets), line))| {
             let persistence = match chain.kind {
-                CurveKind::Axial => largest(chain.edges.iter().map(|&e| third(&network, e)), never),
+                CurveKind::Axial => largest(chain.edges.iter().map(|&e| network.third_erosion(e)), never),
                 CurveKind::Rib => sheet_persistence[sheets[0].index()],
                 CurveKind::Wire => wire_persistence(regularised, chain, never),
                 CurveKind::Seam => 0.0,
@@ -130,14 +131,6 @@ pub fn coarse_scaffold(
 /// Largest value, capped at `never`.
 fn largest(values: impl Iterator<Item = f64>, never: f64) -> f64 {
     values.fold(0.0, f64::max).min(never)
-}
-
-/// Third-highest erosion thickness at an axial edge (three facets at most meet there).
-fn third(network: &Network, edge: u32) -> f64 {
-    network
-        .facets(edge)
-        .map(|f| network.regularised.erosion_mm[f as usize])
-        .fold(f64::INFINITY, f64::min)
 }
 
 fn wire_persistence(regularised: &Regularised, chain: &Chain, never: f64) -> f64 {
@@ -252,14 +245,7 @@ fn nodes(fine: &FineScaffold, node_vertices: &[Vec<u32>], curves: &[Curve]) -> V
         .enumerate()
         .map(|(i, (vertices, at))| {
             // A contracted node sits where the scaffold is thickest: at the end of the axial curve, not on the rib.
-            let v = vertices
-                .iter()
-                .copied()
-                .max_by(|&a, &b| {
-                    let r = |v: u32| fine.vertex_radius[v as usize];
-                    r(a).total_cmp(&r(b)).then(b.cmp(&a))
-                })
-                .unwrap_or(0) as usize;
+            let v = thickest(fine, vertices.iter().copied()).unwrap_or(0) as usize;
             let kind = node_kind(&at, curves);
             Node {
                 id: NodeId::from_index(i),

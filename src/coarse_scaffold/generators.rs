@@ -39,7 +39,11 @@ pub(crate) fn generator_hosts(
         }
         hosts[run[0].0 as usize] = Host::Sheet(SheetId(best.1));
     }
-    let of_vertex = vertex_hosts(fine, links, sheet_of_facet, node_of_vertex);
+    let alive_edges: Vec<[u32; 2]> = (0..fine.num_edges())
+        .filter(|&e| regularised.alive.edges[e])
+        .map(|e| fine.edge_vertices[e])
+        .collect();
+    let of_vertex = vertex_hosts(fine, links, sheet_of_facet, node_of_vertex, &alive_edges);
     let alive: Vec<u32> = (0..fine.num_vertices() as u32)
         .filter(|&v| regularised.alive.vertices[v as usize])
         .collect();
@@ -57,12 +61,14 @@ pub(crate) fn generator_hosts(
         .collect()
 }
 
-/// What holds each alive vertex: the smallest sheet at it, else its wire, else its node.
+/// What holds each alive vertex: the smallest sheet at it, else its wire, else its node; what a node has taken in falls to a
+/// sheet or wire that ends there.
 fn vertex_hosts(
     fine: &FineScaffold,
     links: &FineLinks,
     sheet_of_facet: &[u32],
     node_of_vertex: &[u32],
+    alive_edges: &[[u32; 2]],
 ) -> Vec<Host> {
     let mut hosts: Vec<Host> = node_of_vertex
         .iter()
@@ -88,5 +94,36 @@ fn vertex_hosts(
             }
         }
     }
-    hosts
+    for vertices in &links.node_vertices {
+        let near = vertices
+            .iter()
+            .map(|&v| hosts[v as usize])
+            .filter(|h| !matches!(h, Host::Node(_)))
+            .min();
+        if let Some(near) = near {
+            for &v in vertices {
+                if matches!(hosts[v as usize], Host::Node(_)) {
+                    hosts[v as usize] = near;
+                }
+            }
+        }
+    }
+    // What is in the complex but not in the graph falls to what it hangs on.
+    loop {
+        let mut found: Vec<(u32, Host)> = Vec::new();
+        for &[a, b] in alive_edges {
+            match (hosts[a as usize], hosts[b as usize]) {
+                (Host::Absent, Host::Absent) => {}
+                (Host::Absent, host) => found.push((a, host)),
+                (host, Host::Absent) => found.push((b, host)),
+                _ => {}
+            }
+        }
+        if found.is_empty() {
+            return hosts;
+        }
+        for (v, host) in found {
+            hosts[v as usize] = host;
+        }
+    }
 }

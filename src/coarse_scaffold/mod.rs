@@ -3,13 +3,16 @@
 //! In: the fine scaffold and its regularisation. Out: [`CoarseScaffold`].
 //!
 //! * [`hypergraph`]: the types that matching, measures and reports read;
-//! * [`build`]: [`coarse_scaffold`], the front function; `network` finds nodes, curves and sheets, `ribs` fits the borders, `attributes`
+//! * [`build`]: [`coarse_scaffold`], the front function; `network` finds nodes, curves and sheets, `contract` makes
+//!   nodes of what is small, `hide` takes out what is below the cut, `ribs` fits the borders, `attributes`
 //!   measures, `generators` maps the surface to them, `natural` finds gaps in the persistences;
 //! * [`view`]: the graph at a coarser tolerance.
 
 mod attributes;
 pub mod build;
+mod contract;
 mod generators;
+mod hide;
 pub mod hypergraph;
 mod natural;
 mod network;

@@ -2,17 +2,19 @@
 //! make a sheet. Topology only, but for the lengths of what may be contracted.
 //!
 //! 1. every edge that is not manifold is a curve edge: wire, rib or axial by its number of facets; seams are told;
-//! 2. short seams and short axial curves are contracted: their vertices become one node. Contracting an arc, or any tree, keeps
-//!    the homotopy type, because a tree is contractible and a subcomplex; a loop is never contracted;
+//! 2. [`super::contract`] makes nodes of short seams, short curves and small sheets, [`super::hide`] takes curves out that are below
+//!    the cut;
 //! 3. nodes are the clusters, the vertices where other than two curve edges meet or two of different kind, and single points;
 //! 4. curves are traced from node to node, then closed ones;
 //! 5. sheets are the facets joined across edges that are not curves.
 
+use super::contract::Cells;
 use super::hypergraph::CurveKind;
 use crate::fine_scaffold::FineScaffold;
 use crate::fine_scaffold::complex::NONE;
 use crate::geometry::mesh::DisjointSets;
-use crate::regularise::{Event, Kind, Regularised};
+use crate::regularise::{Event, Regularised};
+use std::collections::BTreeMap;
 
 /// A curve as a chain of fine edges and vertices.
 #[derive(Clone, Debug)]
@@ -28,10 +30,15 @@ pub(crate) struct Network<'a> {
     pub regularised: &'a Regularised,
     /// Alive facets at each edge.
     count: Vec<u8>,
-    seam: Vec<bool>,
-    contracted: Vec<bool>,
-    clusters: DisjointSets,
-    in_cluster: Vec<bool>,
+    pub(super) seam: Vec<bool>,
+    /// Edges and facets inside nodes, the nodes as sets of vertices, and the cells of each node by its root.
+    pub(super) contracted: Vec<bool>,
+    pub(super) contracted_facet: Vec<bool>,
+    pub(super) clusters: DisjointSets,
+    pub(super) in_cluster: Vec<bool>,
+    /// Curve edges that the graph does not show.
+    pub(super) hidden: Vec<bool>,
+    pub(super) cells: BTreeMap<u32, Cells>,
     /// Contractions that were done or refused.
     pub transforms: Vec<Event>,
 }
@@ -54,6 +61,9 @@ impl<'a> Network<'a> {
             count,
             seam,
             contracted: vec![false; fine.num_edges()],
+            hidden: vec![false; fine.num_edges()],
+            contracted_facet: vec![false; fine.num_facets()],
+            cells: BTreeMap::new(),
             clusters: DisjointSets::new(fine.num_vertices()),
             in_cluster: vec![false; fine.num_vertices()],
             transforms: Vec::new(),
@@ -66,7 +76,7 @@ impl<'a> Network<'a> {
 
     /// Kind of an edge; `None` for manifold edges and dead ones.
     pub fn kind(&self, e: u32) -> Option<CurveKind> {
-        if !self.edge_alive(e) {
+        if !self.edge_alive(e) || self.hidden[e as usize] {
             return None;
         }
         match self.count[e as usize] {
@@ -77,13 +87,28 @@ impl<'a> Network<'a> {
         }
     }
 
+    /// Alive edges at a vertex.
+    pub fn alive_edges(&self, v: u32) -> impl Iterator<Item = u32> + '_ {
+        self.fine
+            .edges_of_vertex(v as usize)
+            .filter(|&e| self.edge_alive(e))
+    }
+
+    /// Third-highest erosion thickness at an axial edge, mm (three facets at most meet there).
+    pub fn third_erosion(&self, e: u32) -> f64 {
+        self.facets(e)
+            .map(|f| self.regularised.erosion_mm[f as usize])
+            .fold(f64::INFINITY, f64::min)
+    }
+
     /// Alive facets at an edge.
     pub fn facets(&self, e: u32) -> impl Iterator<Item = u32> + '_ {
         let alive = |f: &u32| self.regularised.alive.facets[*f as usize];
         self.fine.facets_of_edge(e as usize).iter().copied().filter(alive)
     }
 
-    fn length(&self, edges: &[u32]) -> f64 {
+    /// Length of a path of edges, mm.
+    pub fn length(&self, edges: &[u32]) -> f64 {
         edges
             .iter()
             .map(|&e| {
@@ -92,52 +117,6 @@ impl<'a> Network<'a> {
                 a.distance(b)
             })
             .sum()
-    }
-
-    /// Contracts seams up to `seam` long, then axial curves between two different nodes up to `axial` long, shortest first.
-    pub fn contract(&mut self, seam: f64, axial: f64) {
-        for path in &self.regularised.seams {
-            if self.length(path) <= seam {
-                self.contract_edges(Kind::Merge, path);
-            }
-        }
-        let mut short: Vec<(f64, Chain)> = self
-            .chains()
-            .into_iter()
-            .filter(|c| c.kind == CurveKind::Axial && c.vertices[0] != c.vertices[c.vertices.len() - 1])
-            .map(|c| (self.length(&c.edges), c))
-            .filter(|(length, _)| *length <= axial)
-            .collect();
-        short.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.edges.cmp(&b.1.edges)));
-        for (_, chain) in short {
-            self.contract_edges(Kind::ContractCurve, &chain.edges);
-        }
-    }
-
-    fn contract_edges(&mut self, kind: Kind, edges: &[u32]) {
-        // A trial on a copy of the clusters touched: refused when the edges would close a loop.
-        let mut trial = self.clusters.clone();
-        let applied = edges.iter().all(|&e| {
-            let [a, b] = self.fine.edge_vertices[e as usize];
-            self.contracted[e as usize] || trial.union(a, b)
-        });
-        let place = self.fine.vertex_position[self.fine.edge_vertices[edges[0] as usize][0] as usize];
-        let cost = self.length(edges);
-        self.transforms.push(if applied {
-            Event::applied(kind, cost, place, 0, 0)
-        } else {
-            Event::skipped(kind, cost, place)
-        });
-        if !applied {
-            return;
-        }
-        self.clusters = trial;
-        for &e in edges {
-            self.contracted[e as usize] = true;
-            for v in self.fine.edge_vertices[e as usize] {
-                self.in_cluster[v as usize] = true;
-            }
-        }
     }
 
     /// Curve edges of a vertex that are not contracted.
@@ -223,21 +202,25 @@ impl<'a> Network<'a> {
         }
     }
 
-    /// The sheets as lists of facets, in order of the smallest.
+    /// The sheets as lists of facets, in order of the smallest; facets inside nodes are in none.
     pub fn sheets(&self) -> Vec<Vec<u32>> {
         let fine = self.fine;
+        let in_sheet =
+            |f: u32| self.regularised.alive.facets[f as usize] && !self.contracted_facet[f as usize];
         let mut sets = DisjointSets::new(fine.num_facets());
         for e in 0..fine.num_edges() as u32 {
-            if self.edge_alive(e) && self.kind(e).is_none() {
-                let mut pair = self.facets(e);
-                if let (Some(a), Some(b)) = (pair.next(), pair.next()) {
-                    sets.union(a, b);
+            if self.edge_alive(e) && self.kind(e).is_none() && !self.contracted[e as usize] {
+                let mut here = self.facets(e).filter(|&f| in_sheet(f));
+                if let Some(a) = here.next() {
+                    for b in here {
+                        sets.union(a, b);
+                    }
                 }
             }
         }
         let mut slot = vec![NONE; fine.num_facets()];
         let mut sheets: Vec<Vec<u32>> = Vec::new();
-        for f in (0..fine.num_facets() as u32).filter(|&f| self.regularised.alive.facets[f as usize]) {
+        for f in (0..fine.num_facets() as u32).filter(|&f| in_sheet(f)) {
             let root = sets.find(f) as usize;
             if slot[root] == NONE {
                 slot[root] = sheets.len() as u32;

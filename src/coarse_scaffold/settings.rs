@@ -10,6 +10,8 @@ pub struct CoarseScaffoldSettings {
     pub contract_seam: f64,
     /// Axial curves up to this long between two nodes are shrunk to a node (transitions A1^5 and A1^2A3-I).
     pub contract_curve: f64,
+    /// Sheets of which half the extent is up to this are shrunk to a node (transition A1^5).
+    pub contract_sheet: f64,
     /// Standard deviation of the Gaussian that curves are smoothed with; their ends stay.
     pub smoothing: f64,
 }
@@ -19,6 +21,7 @@ impl Default for CoarseScaffoldSettings {
         Self {
             contract_seam: 2.5,
             contract_curve: 0.5,
+            contract_sheet: 1.0,
             smoothing: 1.0,
         }
     }

@@ -79,9 +79,9 @@ impl Cover {
         cover
     }
 
-    /// Movement caused by the steps of the log from `since` on. With `exact` the worst movement itself, otherwise any value
-    /// at most 1 when all generators are still within their tolerance.
-    pub fn movement(&self, complex: &Complex, since: usize, exact: bool) -> Move {
+    /// Movement caused by the steps of the log from `since` on, in tolerances: exact where it is above `enough`, any value up to
+    /// `enough` where it is below; above `stop` the first one found.
+    pub fn movement(&self, complex: &Complex, since: usize, enough: Option<f64>, stop: f64) -> Move {
         let fine = complex.fine;
         let mut out = Move::default();
         for step in &complex.log[since..] {
@@ -91,18 +91,17 @@ impl Cover {
             let mut g = self.first[vertex as usize];
             while g != NONE {
                 let tau = self.tolerance[g as usize];
-                let enough = (!exact).then_some(tau);
-                let found = self
-                    .tree
-                    .nearest(fine.generator_position[g as usize], enough, |v| {
-                        complex.vertex_alive[v as usize]
-                    });
+                let found = self.tree.nearest(
+                    fine.generator_position[g as usize],
+                    enough.map(|x| x * tau),
+                    |v| complex.vertex_alive[v as usize],
+                );
                 let (id, distance) = found.map_or((NONE, f64::INFINITY), |b| (b.id, b.distance));
                 out.worst = out.worst.max(distance / tau);
                 if id != NONE {
                     out.witness.push((g, id));
                 }
-                if !exact && out.worst > 1.0 {
+                if out.worst > stop {
                     return out;
                 }
                 g = self.next[g as usize];

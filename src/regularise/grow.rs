@@ -9,14 +9,22 @@ use super::measure::Measure;
 use super::queue::Queue;
 
 /// Facets of erosion thickness at least `least` tolerances grow back across ribs; those at least `least_axial` may lengthen
-/// axial curves. Returns the number of facets added.
-pub(crate) fn grow_sheets(complex: &mut Complex, relative: &[f64], least: f64, least_axial: f64) -> usize {
+/// axial curves. Facets of any erosion thickness close the corners between a sheet and the `whisker` edges that hang on it, so
+/// that a place brought back to keep the surface is part of the sheet and no wire. Returns the number of facets added.
+pub(crate) fn grow_sheets(
+    complex: &mut Complex,
+    relative: &[f64],
+    least: f64,
+    least_axial: f64,
+    whisker: &[bool],
+) -> usize {
     let fine = complex.fine;
     let mut axial = axial_degree(complex);
     let mut queue = Queue::new();
     let offer = |queue: &mut Queue, f: u32| {
         let value = relative[f as usize];
-        if value >= least && value.is_finite() {
+        let closes = fine.facet_edges(f as usize).iter().any(|&e| whisker[e as usize]);
+        if (value >= least || closes) && value.is_finite() {
             queue.push(-value, f);
         }
     };
@@ -28,7 +36,7 @@ pub(crate) fn grow_sheets(complex: &mut Complex, relative: &[f64], least: f64, l
     }
     let mut added = 0;
     while let Some((key, f)) = queue.pop() {
-        if complex.facet_alive[f as usize] || !fits(complex, &axial, f, -key >= least_axial) {
+        if complex.facet_alive[f as usize] || !fits(complex, &axial, f, -key >= least_axial, whisker) {
             continue;
         }
         expand(complex, f);
@@ -49,18 +57,18 @@ pub(crate) fn grow_sheets(complex: &mut Complex, relative: &[f64], least: f64, l
     added
 }
 
-/// Whether the alive part of a dead facet's ring is one arc that it may grow from: of ribs, and of manifold edges only in one
-/// run that goes on from the end of an axial curve.
-fn fits(complex: &Complex, axial: &[u8], facet: u32, may_lengthen: bool) -> bool {
+/// Whether the alive part of a dead facet's ring is one arc that it may grow from: of ribs and whiskers, and of manifold edges
+/// only in one run that goes on from the end of an axial curve.
+fn fits(complex: &Complex, axial: &[u8], facet: u32, may_lengthen: bool, whisker: &[bool]) -> bool {
     let edges = complex.fine.facet_edges(facet as usize);
     let vertices = complex.fine.facet_vertices(facet as usize);
     let n = edges.len();
     let count = |k: usize| {
         let e = edges[k % n] as usize;
-        if complex.edge_alive[e] {
-            complex.edge_count[e]
-        } else {
-            u8::MAX
+        match complex.edge_alive[e] {
+            true if complex.edge_count[e] == 0 && whisker[e] => 1,
+            true => complex.edge_count[e],
+            false => u8::MAX,
         }
     };
     let (mut runs, mut at_end) = (0, false);

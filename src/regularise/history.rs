@@ -19,6 +19,8 @@ pub enum Kind {
     PruneWires,
     /// Sheets grown back across their ribs.
     GrowBack,
+    /// Fingers narrower than the tolerance trimmed off the ribs.
+    TrimFringe,
     /// Wires grown back from their tips.
     GrowWires,
     /// Removed pieces put back because the surface had moved by more than the tolerance.
@@ -29,6 +31,8 @@ pub enum Kind {
     ContractCurve,
     /// A small sheet shrunk to a node (transition A1^5).
     ContractSheet,
+    /// An axial curve below the cut that the surface cannot do without, left out of the graph.
+    HideCurve,
     /// A node joined to a near curve or node across a sheet (transitions A1A3-II, A1^2A3-I, A1^4).
     Merge,
 }

@@ -7,7 +7,7 @@
 //! 2. [`burn`]: erosion thickness of every facet;
 //! 3. [`collapse`]: facets of small ET, and wires, go from the ribs and tips inward;
 //! 4. [`splice`] whole sheets by largest ET, [`fins`] by hysteresis, until nothing changes;
-//! 5. [`grow`]: survivors grow back across their ribs and from their tips;
+//! 5. [`grow`]: survivors grow back across their ribs and from their tips; [`fringe`]s are trimmed;
 //! 6. small remnants and [`wires`] go;
 //! 7. [`fidelity`]: what moves the surface by more than the tolerance is brought back;
 //! 8. [`seams`]: gaps at the ends of axial curves become borders.
@@ -24,6 +24,7 @@ pub mod complex;
 pub(crate) mod cover;
 pub mod fidelity;
 pub(crate) mod fins;
+pub(crate) mod fringe;
 pub(crate) mod grow;
 pub mod history;
 pub(crate) mod measure;

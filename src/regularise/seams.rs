@@ -3,6 +3,9 @@
 //! to a near rib or curve. Nothing of the complex is removed; the path only counts as a border.
 //!
 //! A path to the curve's own rib is not a seam: the way along the curves must be much longer than the path.
+//!
+//! Where the scaffold is thick the end of an axial curve has no rib to meet, but it may stop short of another axial curve; the
+//! seam between the two is what later merges them (transitions A1A3-II and A1^2A3-I).
 
 use super::complex::Complex;
 use super::fins::axial_degree;
@@ -14,6 +17,8 @@ use std::collections::BTreeMap;
 
 /// The way along the curves must be this many times the seam.
 const DETOUR: f64 = 2.5;
+/// Seams may always be this many spacings long.
+const SEAM_SPACINGS: f64 = 2.0;
 
 /// Finds the seams: paths of edges, each from an axial end to a curve.
 pub(crate) fn find_seams(
@@ -29,10 +34,19 @@ pub(crate) fn find_seams(
     for v in 0..fine.num_vertices() as u32 {
         let radius = fine.vertex_radius[v as usize];
         let tau = measure.tolerance.at(radius);
-        if degree[v as usize] != 1 || radius > settings.seam_radius * tau {
+        if degree[v as usize] != 1 {
             continue;
         }
-        let Some(path) = seam_from(complex, &is_seam, v, settings.seam_length * tau) else {
+        let at_rib = radius <= settings.seam_radius * tau;
+        let longest = tau
+            * if at_rib {
+                settings.seam_length
+            } else {
+                settings.merge_length
+            };
+        // At a sampling as coarse as the tolerance the gap is as wide as two spacings.
+        let longest = longest.max(SEAM_SPACINGS * fine.scale.spacing_mm);
+        let Some(path) = seam_from(complex, &is_seam, v, longest, at_rib) else {
             continue;
         };
         let length = path
@@ -58,7 +72,14 @@ pub(crate) fn find_seams(
     seams
 }
 
-fn seam_from(complex: &Complex, is_seam: &[bool], start: u32, longest: f64) -> Option<Vec<u32>> {
+/// The seam from an axial end: to the nearest curve, ribs among them only `at_rib`.
+fn seam_from(
+    complex: &Complex,
+    is_seam: &[bool],
+    start: u32,
+    longest: f64,
+    at_rib: bool,
+) -> Option<Vec<u32>> {
     let fine = complex.fine;
     let on_curve = |e: u32| complex.edge_count[e as usize] != 2 || is_seam[e as usize];
     let along = distances_along_curves(complex, &on_curve, start, DETOUR * longest);
@@ -76,7 +97,12 @@ fn seam_from(complex: &Complex, is_seam: &[bool], start: u32, longest: f64) -> O
             .any(|e| complex.edge_alive[e as usize] && on_curve(e));
         if v != start && touches_curve {
             let detour = along.get(&v).copied().unwrap_or(f64::INFINITY);
-            if detour > DETOUR * distance {
+            let meets = at_rib
+                || fine.edges_of_vertex(v as usize).any(|e| {
+                    complex.edge_alive[e as usize]
+                        && (complex.edge_count[e as usize] >= 3 || is_seam[e as usize])
+                });
+            if meets && detour > DETOUR * distance {
                 let mut path = Vec::new();
                 let mut at = v;
                 while let Some(&e) = reached.get(&at) {

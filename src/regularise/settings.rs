@@ -28,12 +28,26 @@ pub struct RegulariseSettings {
     pub cost: Cost,
     /// Facets of erosion thickness below this many tolerances are collapsed before sheets are looked at.
     pub collapse: f64,
-    /// Sheets and fins of erosion thickness below this many tolerances are removed.
+    /// The cut: sheets and fins of erosion thickness below this many tolerances are removed. Below 1, because the surface moves by up
+    /// to the erosion thickness of what goes, and what the tolerance forbids to remove comes and goes with the sampling.
     pub splice: f64,
+    /// Elements of erosion thickness below this many spacings say more of the sampling than of the shape: the cut is never
+    /// below it, and never above one tolerance for its sake.
+    pub splice_spacings: f64,
+    /// Sheets without which the surface moves by no more than this many tolerances are spliced up to
+    /// [`Self::slight_erosion`]. Where the two sides of a sheet are nearly parallel to it (round shafts, swellings, near concave
+    /// edges) the sampling makes sheets of large erosion thickness that stand for nothing.
+    pub slight_move: f64,
+    /// Largest erosion thickness, in tolerances, of sheets spliced for their slight movement.
+    pub slight_erosion: f64,
     /// Sheets grow back across their ribs to this erosion thickness, in tolerances.
     pub grow_back: f64,
     /// Facets that lengthen an axial curve grow back to this erosion thickness, in tolerances.
     pub grow_back_axial: f64,
+    /// Fingers along ribs up to twice this many tolerances wide are trimmed.
+    pub fringe_width: f64,
+    /// Facets of erosion thickness below this many tolerances may be trimmed as fringe, when the surface moves by no more.
+    pub fringe_erosion: f64,
     /// Rounds of splicing and trimming; they end sooner when nothing changes.
     pub rounds: u32,
     /// Wires are pruned at this many times the threshold of sheets, because the erosion thickness of a curve of finite
@@ -43,6 +57,8 @@ pub struct RegulariseSettings {
     pub seam_radius: f64,
     /// Longest seam, in tolerances.
     pub seam_length: f64,
+    /// Longest path, in tolerances, across which the end of an axial curve is merged with another axial curve, at any radius.
+    pub merge_length: f64,
     /// With [`Cost::Count`]: sheets with fewer generators than this are spliced.
     pub count_threshold: u32,
 }
@@ -53,13 +69,19 @@ impl Default for RegulariseSettings {
             tolerance: Length::PercentDiagonal(1.0),
             cost: Cost::Length,
             collapse: 0.5,
-            splice: 1.0,
+            splice: 0.75,
+            splice_spacings: 0.9,
+            slight_move: 0.1,
+            slight_erosion: 6.0,
             grow_back: 0.15,
             grow_back_axial: 0.3,
+            fringe_width: 1.5,
+            fringe_erosion: 0.5,
             rounds: 3,
             wire: 1.15,
             seam_radius: 5.0,
             seam_length: 2.5,
+            merge_length: 2.5,
             count_threshold: 100,
         }
     }
@@ -116,8 +138,14 @@ impl RegulariseSettings {
         positive("tolerance", tolerance)?;
         positive("collapse", self.collapse)?;
         positive("splice", self.splice)?;
+        positive("slight_move", self.slight_move)?;
+        positive("slight_erosion", self.slight_erosion)?;
+        positive("merge_length", self.merge_length)?;
+        positive("splice_spacings", self.splice_spacings)?;
         positive("grow_back", self.grow_back)?;
         positive("grow_back_axial", self.grow_back_axial)?;
+        positive("fringe_width", self.fringe_width)?;
+        positive("fringe_erosion", self.fringe_erosion)?;
         positive("wire", self.wire)?;
         positive("seam_radius", self.seam_radius)?;
         positive("seam_length", self.seam_length)

@@ -7,13 +7,14 @@ use super::complex::{Alive, Complex, Step};
 use super::cover::Cover;
 use super::fidelity::{self, Fidelity};
 use super::fins::trim_fins;
+use super::fringe::{Fringe, trim_fringes};
 use super::grow::{grow_sheets, grow_wires};
 use super::history::{Event, Kind};
 use super::measure::{Measure, Tolerance};
 use super::seams::find_seams;
 use super::settings::{Cost, RegulariseError, RegulariseSettings};
 use super::splice::Splicer;
-use super::wires::{remove_small_wires, remove_whiskers};
+use super::wires::{remove_small_wires, remove_whiskers, whiskers};
 use crate::fine_scaffold::{Betti, FineScaffold};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -48,9 +49,20 @@ pub struct Regularised {
     pub fidelity: Fidelity,
     /// The tolerance, mm; with a tolerance relative to the radius, that at the largest radius.
     pub tolerance_mm: f64,
+    /// What was cheapest first.
+    pub cost: Cost,
+    /// The cut, in local tolerances: what is less persistent has been removed, unless the surface would have moved too far. 0
+    /// when costs are not lengths.
+    pub cut: f64,
+    pub(crate) local_tolerance: Tolerance,
 }
 
 impl Regularised {
+    /// The tolerance at a medial point of the given radius, mm.
+    pub fn tolerance_at(&self, radius_mm: f64) -> f64 {
+        self.local_tolerance.at(radius_mm)
+    }
+
     /// The Betti numbers, the same at every stage.
     pub fn betti(&self) -> Betti {
         self.betti.last().map(|s| s.betti).unwrap_or_default()
@@ -74,6 +86,8 @@ pub fn regularise(
 ) -> Result<Regularised, RegulariseError> {
     settings.check()?;
     let mut run = Run::new(fine, settings);
+    let sampling = settings.splice_spacings * fine.scale.spacing_mm / run.largest_tolerance();
+    run.cut = settings.splice.max(sampling.min(1.0));
     run.checked("fine scaffold")?;
     run.stage(Kind::Cells, |run| remove_cells(&mut run.complex));
     run.checked("3-cells")?;
@@ -99,6 +113,8 @@ struct Run<'a> {
     /// Erosion thickness of facets, mm and in tolerances.
     erosion: Vec<f64>,
     relative: Vec<f64>,
+    /// Elements of less persistence go, in tolerances.
+    cut: f64,
     history: Vec<Event>,
     betti: Vec<StageBetti>,
 }
@@ -113,6 +129,7 @@ impl<'a> Run<'a> {
             fire: WireFire::new(fine.num_vertices()),
             erosion: Vec::new(),
             relative: Vec::new(),
+            cut: 0.0,
             history: Vec::new(),
             betti: Vec::new(),
         }
@@ -187,7 +204,9 @@ impl<'a> Run<'a> {
         let splicer = Splicer {
             measure: &self.measure,
             relative: &self.relative,
-            limit: self.settings.splice,
+            limit: self.cut,
+            slight_move: self.settings.slight_move,
+            slight_erosion: self.settings.slight_erosion,
             wire: self.settings.wire,
             count: (self.settings.cost == Cost::Count).then_some(self.settings.count_threshold),
         };
@@ -202,7 +221,7 @@ impl<'a> Run<'a> {
                     &mut self.complex,
                     &self.measure,
                     &self.relative,
-                    self.settings.splice,
+                    self.cut,
                     self.settings.wire,
                     &mut self.fire,
                     cover,
@@ -224,18 +243,29 @@ impl<'a> Run<'a> {
             });
         }
         let (least, least_axial) = (self.settings.grow_back, self.settings.grow_back_axial);
+        let whisker = whiskers(&self.complex, &self.measure, 2.0 * self.settings.seam_length);
         self.stage(Kind::GrowBack, |run| {
-            grow_sheets(&mut run.complex, &run.relative, least, least_axial);
+            grow_sheets(&mut run.complex, &run.relative, least, least_axial, &whisker);
         });
         self.stage(Kind::GrowWires, |run| {
             grow_wires(&mut run.complex, &run.measure, &run.fire, least);
         });
         let mut cover = Cover::new(&self.complex, &self.measure, Some(cover.clone()));
+        if self.settings.cost == Cost::Length {
+            self.stage(Kind::TrimFringe, |run| {
+                let fringe = Fringe {
+                    width: run.settings.fringe_width,
+                    most: run.settings.fringe_erosion,
+                    movement: run.settings.fringe_erosion,
+                };
+                trim_fringes(&mut run.complex, &run.measure, &run.relative, fringe, &mut cover);
+            });
+        }
         self.splice(&mut cover);
         remove_small_wires(
             &mut self.complex,
             &self.measure,
-            self.settings.splice,
+            self.cut,
             &mut cover,
             &mut self.history,
         );
@@ -287,6 +317,12 @@ impl<'a> Run<'a> {
             betti: self.betti,
             fidelity,
             tolerance_mm,
+            cost: self.settings.cost,
+            cut: match self.settings.cost {
+                Cost::Length => self.cut,
+                Cost::Count => 0.0,
+            },
+            local_tolerance: self.measure.tolerance,
         }
     }
 }

@@ -37,7 +37,7 @@ pub(crate) fn remove_small_wires(
         if complex.log.len() == since {
             continue;
         }
-        let movement = cover.movement(complex, since, false);
+        let movement = cover.movement(complex, since, Some(limit), limit);
         if movement.worst > limit {
             complex.undo_to(since);
             continue;
@@ -56,10 +56,10 @@ pub(crate) fn remove_small_wires(
     removed
 }
 
-/// Removes the whiskers: dangling wires on the borders of sheets, left over where a facet went through one of several free
-/// edges or where sheets went before their corner. They would keep the sheets from growing back. A whisker is a tree of wire
-/// edges that hangs on a facet and is no longer than `longest` tolerances in all. Returns the number of edges removed.
-pub(crate) fn remove_whiskers(complex: &mut Complex, measure: &Measure, longest: f64) -> usize {
+/// The whiskers: dangling wires on the borders of sheets, left over where a facet went through one of several free
+/// edges or where sheets went before their corner, or brought back for a corner of the surface. A whisker is a tree of wire
+/// edges that hangs on a facet and is no longer than `longest` tolerances in all. One flag an edge.
+pub(crate) fn whiskers(complex: &Complex, measure: &Measure, longest: f64) -> Vec<bool> {
     let fine = complex.fine;
     let is_wire = |e: u32| complex.edge_alive[e as usize] && complex.edge_count[e as usize] == 0;
     let wires: Vec<u32> = (0..fine.num_edges() as u32).filter(|&e| is_wire(e)).collect();
@@ -95,6 +95,13 @@ pub(crate) fn remove_whiskers(complex: &mut Complex, measure: &Measure, longest:
         let tau = measure.tolerance.at(measure.edge_radius[e as usize]);
         whisker[e as usize] = on_sheet[root] && length[root] <= longest * tau;
     }
+    whisker
+}
+
+/// Removes the whiskers, which would keep the sheets from growing back. Returns the number of edges removed.
+pub(crate) fn remove_whiskers(complex: &mut Complex, measure: &Measure, longest: f64) -> usize {
+    let fine = complex.fine;
+    let whisker = whiskers(complex, measure, longest);
     let mut removed = 0;
     for tip in 0..fine.num_vertices() as u32 {
         let mut at = tip;

@@ -1,0 +1,114 @@
+//! What the graph does not show. The complex keeps some pieces that are less persistent than the cut, because without them the surface
+//! would move too far: the last facets of a fin that is thin and wide, or the short whisker that holds one corner. They stay in
+//! the complex, so that homotopy type and surface are kept, but they are no elements of the graph, whose elements would
+//! otherwise come and go with the sampling.
+//!
+//! 1. whiskers: wires with a free tip that hang on a sheet and are no longer than one and a half seams;
+//! 2. axial curves of less persistence than the cut, the least persistent first. The sheets along a curve that is hidden are one
+//!    sheet, and the curves on both sides of its ends become one where nothing else ends there, with the larger persistence.
+//!
+//! Cost `O(n)` for each curve hidden.
+
+use super::hypergraph::CurveKind;
+use super::network::{Chain, Network};
+use super::settings::CoarseScaffoldSettings;
+use crate::regularise::{Event, Kind};
+
+/// Hides whiskers and the axial curves below the cut.
+pub(crate) fn hide(network: &mut Network, settings: &CoarseScaffoldSettings) {
+    if !network.regularised.cut.is_finite() || network.regularised.cut <= 0.0 {
+        return;
+    }
+    let whiskers: Vec<Chain> = network
+        .chains()
+        .into_iter()
+        .filter(|c| is_whisker(network, c, settings.contract_seam))
+        .collect();
+    for chain in &whiskers {
+        hide_chain(network, chain);
+    }
+    loop {
+        let weakest = network
+            .chains()
+            .into_iter()
+            .filter(|c| c.kind == CurveKind::Axial)
+            .map(|c| (relative_persistence(network, &c), c))
+            .filter(|(p, _)| *p < network.regularised.cut)
+            .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.edges.cmp(&b.1.edges)));
+        let Some((persistence, chain)) = weakest else {
+            return;
+        };
+        let v = chain.vertices[0] as usize;
+        let tau = network.regularised.tolerance_at(network.fine.vertex_radius[v]);
+        let place = network.fine.vertex_position[v];
+        hide_chain(network, &chain);
+        drop_loose_seams(network);
+        network
+            .transforms
+            .push(Event::applied(Kind::HideCurve, persistence * tau, place, 0, 0));
+    }
+}
+
+/// Seams that no shown axial curve goes on from are none any more.
+fn drop_loose_seams(network: &mut Network) {
+    for path in &network.regularised.seams {
+        let Some(&first) = path.first() else { continue };
+        if !network.seam[first as usize] {
+            continue;
+        }
+        // The end that the path does not go on from.
+        let [a, b] = network.fine.edge_vertices[first as usize];
+        let start = match path.get(1) {
+            Some(&next) if network.fine.edge_vertices[next as usize].contains(&a) => b,
+            Some(_) => a,
+            None => {
+                let axial = |v: u32| {
+                    network
+                        .alive_edges(v)
+                        .any(|e| network.kind(e) == Some(CurveKind::Axial))
+                };
+                if axial(a) || axial(b) {
+                    continue;
+                }
+                a
+            }
+        };
+        let goes_on = network
+            .alive_edges(start)
+            .any(|e| network.kind(e) == Some(CurveKind::Axial));
+        if !goes_on {
+            for &e in path {
+                network.seam[e as usize] = false;
+            }
+        }
+    }
+}
+
+fn hide_chain(network: &mut Network, chain: &Chain) {
+    for &e in &chain.edges {
+        network.hidden[e as usize] = true;
+    }
+}
+
+/// Largest third-highest erosion thickness along an axial curve, in tolerances.
+fn relative_persistence(network: &Network, chain: &Chain) -> f64 {
+    let value = |&e: &u32| {
+        let [a, b] = network.fine.edge_vertices[e as usize];
+        let radius = 0.5 * (network.fine.vertex_radius[a as usize] + network.fine.vertex_radius[b as usize]);
+        network.third_erosion(e) / network.regularised.tolerance_at(radius)
+    };
+    chain.edges.iter().map(value).fold(0.0, f64::max)
+}
+
+/// Whether a chain is a short wire from a tip to a sheet.
+fn is_whisker(network: &Network, chain: &Chain, longest: f64) -> bool {
+    let (first, last) = (chain.vertices[0], chain.vertices[chain.vertices.len() - 1]);
+    let edges_at = |v: u32| network.alive_edges(v).count();
+    let holds_facet = |v: u32| network.alive_edges(v).any(|e| network.facets(e).next().is_some());
+    let tau = network.regularised.tolerance_at(
+        network.fine.vertex_radius[last as usize].max(network.fine.vertex_radius[first as usize]),
+    );
+    chain.kind == CurveKind::Wire
+        && (edges_at(first) == 1 && holds_facet(last) || edges_at(last) == 1 && holds_facet(first))
+        && network.length(&chain.edges) <= 1.5 * longest * tau.max(network.fine.scale.spacing_mm)
+}
