@@ -92,7 +92,9 @@ fn junctions_and_swellings_of_tubes_leave_wires_only() {
         .iter()
         .find(|n| n.curves.len() == 3)
         .expect("the three wires meet in one node");
-    assert!(centre.position.length() <= y.tolerance_mm);
+    // Inside the circle round the small triangle of the exact medial set, where the radius differs by less than the tolerance.
+    assert!(centre.position.length() <= 0.25 / 3f64.sqrt());
+    assert!((centre.radius - 0.25).abs() <= y.tolerance_mm);
     check_references(&y);
     let d = scaffold(&shapes::dumbbell(2.0, 0.5, 0.2), 10_000, 1);
     assert_eq!(counts(&d), [0, 0, 0, 1, 2]);

@@ -23,6 +23,7 @@ use crate::fine_scaffold::FineScaffold;
 use crate::fine_scaffold::complex::NONE;
 use crate::geometry::{CurveId, NodeId, SheetId};
 use crate::regularise::Regularised;
+use glam::DVec3;
 use std::collections::BTreeMap;
 
 /// Makes the coarse scaffold; see the module for what the attributes mean.
@@ -66,7 +67,7 @@ pub fn coarse_scaffold(
                 .collect()
         })
         .collect();
-    let lines = polylines(
+    let mut lines = polylines(
         fine,
         regularised,
         &chains,
@@ -75,6 +76,18 @@ pub fn coarse_scaffold(
         &node_of_vertex,
         settings,
     );
+    let node_points = node_points(fine, &node_vertices, &chains, &lines, &node_of_vertex);
+    for (chain, line) in chains.iter().zip(&mut lines) {
+        if chain.kind == CurveKind::Rib {
+            pin(
+                line,
+                ends_of(chain, &node_of_vertex),
+                &node_points,
+                settings.contract_seam * tau,
+                settings.smoothing * tau,
+            );
+        }
+    }
     let mut border: BTreeMap<u32, MedialPoint> = BTreeMap::new();
     for (chain, line) in chains.iter().zip(&lines) {
         border.extend(chain.vertices.iter().copied().zip(line.iter().copied()));
@@ -91,10 +104,12 @@ pub fn coarse_scaffold(
                 CurveKind::Wire => wire_persistence(regularised, chain, never),
                 CurveKind::Seam => 0.0,
             };
+            let ends = ends_of(chain, &node_of_vertex);
+            let line = reach_nodes(line, ends, &node_points, settings.smoothing * tau);
             curve(chain, i, sheets, persistence, &node_of_vertex, line)
         })
         .collect();
-    let mut nodes = nodes(fine, &node_vertices, &curves);
+    let mut nodes = nodes(&node_points, &curves);
     seam_persistence(&mut curves, &nodes);
     for node in &mut nodes {
         node.persistence = node_persistence(&node.curves, &curves);
@@ -232,29 +247,118 @@ fn curve(
     }
 }
 
-fn nodes(fine: &FineScaffold, node_vertices: &[Vec<u32>], curves: &[Curve]) -> Vec<Node> {
-    let mut curves_at: Vec<Vec<CurveId>> = vec![Vec::new(); node_vertices.len()];
+/// Nodes of the two ends of a chain; none for a closed one.
+fn ends_of(chain: &Chain, node_of_vertex: &[u32]) -> Option<[usize; 2]> {
+    let node = |v: u32| match node_of_vertex[v as usize] {
+        NONE => None,
+        n => Some(n as usize),
+    };
+    Some([
+        node(chain.vertices[0])?,
+        node(chain.vertices[chain.vertices.len() - 1])?,
+    ])
+}
+
+/// Where the nodes are: on the fitted ribs that end there, where the scaffold is thin (a node made of an axial curve's end and of
+/// the rib that its seam leads to belongs on the rib); elsewhere at the thickest vertex.
+fn node_points(
+    fine: &FineScaffold,
+    node_vertices: &[Vec<u32>],
+    chains: &[Chain],
+    lines: &[Vec<MedialPoint>],
+    node_of_vertex: &[u32],
+) -> Vec<MedialPoint> {
+    let mut rib_ends: Vec<(DVec3, f64, f64)> = vec![(DVec3::ZERO, 0.0, 0.0); node_vertices.len()];
+    for (chain, line) in chains.iter().zip(lines).filter(|(c, _)| c.kind == CurveKind::Rib) {
+        if let (Some(ends), [first, .., last]) = (ends_of(chain, node_of_vertex), line.as_slice()) {
+            for (node, point) in ends.into_iter().zip([first, last]) {
+                let (position, radius, count) = &mut rib_ends[node];
+                *position += point.position;
+                *radius += point.radius;
+                *count += 1.0;
+            }
+        }
+    }
+    node_vertices
+        .iter()
+        .zip(rib_ends)
+        .map(|(vertices, (position, radius, count))| {
+            if count > 0.0 {
+                return MedialPoint {
+                    position: position / count,
+                    radius: radius / count,
+                };
+            }
+            let v = thickest(fine, vertices.iter().copied()).unwrap_or(0) as usize;
+            MedialPoint {
+                position: fine.vertex_position[v],
+                radius: fine.vertex_radius[v],
+            }
+        })
+        .collect()
+}
+
+/// Puts the ends of a line on its nodes where they are near and smooths what lies between.
+fn pin(
+    line: &mut [MedialPoint],
+    ends: Option<[usize; 2]>,
+    nodes: &[MedialPoint],
+    near_mm: f64,
+    width_mm: f64,
+) {
+    if let (Some([a, b]), [first, .., last]) = (ends, &mut *line) {
+        for (end, node) in [(first, nodes[a]), (last, nodes[b])] {
+            if end.position.distance(node.position) <= near_mm {
+                *end = node;
+            }
+        }
+        attributes::smooth(line, false, width_mm);
+    }
+}
+
+/// A line lengthened to its nodes.
+fn reach_nodes(
+    mut line: Vec<MedialPoint>,
+    ends: Option<[usize; 2]>,
+    nodes: &[MedialPoint],
+    width_mm: f64,
+) -> Vec<MedialPoint> {
+    let (Some([a, b]), Some(first), Some(last)) = (ends, line.first().copied(), line.last().copied()) else {
+        return line;
+    };
+    let mut longer = false;
+    if first != nodes[a] {
+        line.insert(0, nodes[a]);
+        longer = true;
+    }
+    if last != nodes[b] {
+        line.push(nodes[b]);
+        longer = true;
+    }
+    if longer {
+        attributes::smooth(&mut line, false, width_mm);
+    }
+    line
+}
+
+fn nodes(points: &[MedialPoint], curves: &[Curve]) -> Vec<Node> {
+    let mut curves_at: Vec<Vec<CurveId>> = vec![Vec::new(); points.len()];
     for c in curves {
         for n in &c.nodes {
             curves_at[n.index()].push(c.id);
         }
     }
-    node_vertices
+    points
         .iter()
         .zip(curves_at)
         .enumerate()
-        .map(|(i, (vertices, at))| {
-            // A contracted node sits where the scaffold is thickest: at the end of the axial curve, not on the rib.
-            let v = thickest(fine, vertices.iter().copied()).unwrap_or(0) as usize;
-            let kind = node_kind(&at, curves);
-            Node {
-                id: NodeId::from_index(i),
-                kind,
-                position: fine.vertex_position[v],
-                radius: fine.vertex_radius[v],
-                curves: at,
-                persistence: 0.0,
-            }
+        .map(|(i, (point, at))| Node {
+            id: NodeId::from_index(i),
+            kind: node_kind(&at, curves),
+            position: point.position,
+            radius: point.radius,
+            curves: at,
+            persistence: 0.0,
         })
         .collect()
 }

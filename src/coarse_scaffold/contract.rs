@@ -40,6 +40,16 @@ pub(crate) struct Cells {
     facets: Vec<u32>,
 }
 
+impl Cells {
+    /// A path of edges.
+    pub fn path(edges: &[u32]) -> Self {
+        Self {
+            edges: edges.to_vec(),
+            facets: Vec::new(),
+        }
+    }
+}
+
 /// What is to be shrunk to a node.
 struct Candidate {
     kind: Kind,
@@ -68,7 +78,16 @@ pub(crate) fn contract(network: &mut Network, settings: &CoarseScaffoldSettings)
     let curves = curves(network, counts);
     shrink(network, curves, limit(settings.contract_curve, COUNT_CURVE));
     let sheets = sheets(network, counts);
-    shrink(network, sheets, limit(settings.contract_sheet, COUNT_SHEET));
+    let sheet = limit(settings.contract_sheet, COUNT_SHEET);
+    shrink(
+        network,
+        sheets,
+        if counts {
+            sheet
+        } else {
+            sheet.max(network.fine.scale.spacing_mm)
+        },
+    );
 }
 
 fn path_cost(network: &Network, edges: &[u32], counts: bool) -> f64 {
@@ -173,7 +192,7 @@ fn shrink(network: &mut Network, mut candidates: Vec<Candidate>, limit: f64) {
 }
 
 /// Makes one node of some cells and of the nodes they touch, if that keeps the homotopy type and the surface.
-fn shrink_one(network: &mut Network, kind: Kind, new: Cells) -> bool {
+pub(crate) fn shrink_one(network: &mut Network, kind: Kind, new: Cells) -> bool {
     let fine = network.fine;
     let vertices: BTreeSet<u32> = new
         .edges

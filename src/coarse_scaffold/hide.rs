@@ -9,6 +9,7 @@
 //!
 //! Cost `O(n)` for each curve hidden.
 
+use super::contract::{Cells, shrink_one};
 use super::hypergraph::CurveKind;
 use super::network::{Chain, Network};
 use super::settings::CoarseScaffoldSettings;
@@ -19,13 +20,19 @@ pub(crate) fn hide(network: &mut Network, settings: &CoarseScaffoldSettings) {
     if !network.regularised.cut.is_finite() || network.regularised.cut <= 0.0 {
         return;
     }
-    let whiskers: Vec<Chain> = network
-        .chains()
-        .into_iter()
-        .filter(|c| is_whisker(network, c, settings.contract_seam))
-        .collect();
-    for chain in &whiskers {
-        hide_chain(network, chain);
+    // A whisker that forks is hidden branch by branch.
+    loop {
+        let whiskers: Vec<Chain> = network
+            .chains()
+            .into_iter()
+            .filter(|c| is_whisker(network, c, settings.contract_seam))
+            .collect();
+        if whiskers.is_empty() {
+            break;
+        }
+        for chain in &whiskers {
+            hide_chain(network, chain);
+        }
     }
     loop {
         let weakest = network
@@ -41,12 +48,33 @@ pub(crate) fn hide(network: &mut Network, settings: &CoarseScaffoldSettings) {
         let v = chain.vertices[0] as usize;
         let tau = network.regularised.tolerance_at(network.fine.vertex_radius[v]);
         let place = network.fine.vertex_position[v];
+        // A stub between a curve and the seam that closes its gap is part of the seam.
+        let stub = Cells::path(&chain.edges);
+        if network.length(&chain.edges) <= settings.contract_seam * tau
+            && goes_on_in_seam(network, &chain)
+            && shrink_one(network, Kind::ContractCurve, stub)
+        {
+            continue;
+        }
         hide_chain(network, &chain);
         drop_loose_seams(network);
         network
             .transforms
             .push(Event::applied(Kind::HideCurve, persistence * tau, place, 0, 0));
     }
+}
+
+/// Whether a live seam starts at an end of a chain.
+fn goes_on_in_seam(network: &Network, chain: &Chain) -> bool {
+    let ends = [chain.vertices[0], chain.vertices[chain.vertices.len() - 1]];
+    network.regularised.seams.iter().any(|path| {
+        path.first().is_some_and(|&e| {
+            network.seam[e as usize]
+                && network.fine.edge_vertices[e as usize]
+                    .iter()
+                    .any(|v| ends.contains(v))
+        })
+    })
 }
 
 /// Seams that no shown axial curve goes on from are none any more.
@@ -73,9 +101,10 @@ fn drop_loose_seams(network: &mut Network) {
                 a
             }
         };
-        let goes_on = network
-            .alive_edges(start)
-            .any(|e| network.kind(e) == Some(CurveKind::Axial));
+        let goes_on = network.in_cluster[start as usize]
+            || network
+                .alive_edges(start)
+                .any(|e| network.kind(e) == Some(CurveKind::Axial));
         if !goes_on {
             for &e in path {
                 network.seam[e as usize] = false;
@@ -103,7 +132,10 @@ fn relative_persistence(network: &Network, chain: &Chain) -> f64 {
 /// Whether a chain is a short wire from a tip to a sheet.
 fn is_whisker(network: &Network, chain: &Chain, longest: f64) -> bool {
     let (first, last) = (chain.vertices[0], chain.vertices[chain.vertices.len() - 1]);
-    let edges_at = |v: u32| network.alive_edges(v).count();
+    let edges_at = |v: u32| {
+        let shown = |e: &u32| !network.hidden[*e as usize];
+        network.alive_edges(v).filter(shown).count()
+    };
     let holds_facet = |v: u32| network.alive_edges(v).any(|e| network.facets(e).next().is_some());
     let tau = network.regularised.tolerance_at(
         network.fine.vertex_radius[last as usize].max(network.fine.vertex_radius[first as usize]),

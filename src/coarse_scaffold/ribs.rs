@@ -8,7 +8,8 @@
 //! 1. each rib is smoothed, ends kept;
 //! 2. around each of its points `ET^(1/p)` of the sheet's facets is fitted by a plane, for `p` of 1, 1.5 and 2; the
 //!    power that leaves the least residual over the whole rib is taken;
-//! 3. the point moves outward along the sheet to the zero of the fit, by no more than a bound;
+//! 3. the point moves outward along the sheet to the zero of the fit, by no more than a bound, and not at all where the rib ends at
+//!    an axial curve in the thick of the scaffold;
 //! 4. the moved curve is smoothed again; its radius follows the slope of the radius along the way;
 //! 5. the border of each sheet's mesh is moved to the fitted ribs and the vertices near it are relaxed, so that the mesh has
 //!    neither steps nor fingers. The exact complex is kept beside it ([`super::FineLinks`]).
@@ -31,6 +32,13 @@ const POWERS: [f64; 3] = [1.0, 1.5, 2.0];
 const REACH: f64 = 5.0;
 /// Facets below this ET, in tolerances, say more of the sampling than of the shape.
 const LEAST: f64 = 0.1;
+
+/// Ribs are smoothed over this many times the width of other curves: they follow the edges of polygons.
+const RIB_WIDTH: f64 = 2.0;
+/// A rib that ends where the scaffold is thick stays there; the fit fades out over this many tolerances towards such an end.
+const FADE: f64 = 3.0;
+/// Radius, in tolerances, above which the scaffold is thick at the end of a rib.
+const THICK: f64 = 5.0;
 
 /// A rib point moves by no more than this many tolerances: on an ellipsoid of axes 1 : 0.7 : 0.4 the rib left at 0.15 tolerances
 /// of ET lies 1.3 tolerances of 1 % inside the true one.
@@ -75,7 +83,9 @@ pub(crate) fn fit_ribs(
         let Some(sheet) = sheet_of_chain[i].filter(|_| chains[i].kind == CurveKind::Rib) else {
             return;
         };
+        let width_mm = RIB_WIDTH * width_mm;
         smooth(line, free[i], width_mm);
+        let fade = fade(line, free[i], regularised);
         let (own, tree) = &samples[sheet as usize];
         let fits: Vec<Vec<Option<Fit>>> = POWERS
             .iter()
@@ -89,14 +99,46 @@ pub(crate) fn fit_ribs(
         let Some(best) = fits.iter().min_by(|a, b| residual(a).total_cmp(&residual(b))) else {
             return;
         };
-        for (q, f) in line.iter_mut().zip(best) {
+        for ((q, f), fade) in line.iter_mut().zip(best).zip(&fade) {
             if let Some(f) = f {
-                q.position += f.to_zero.clamp_length_max(furthest);
-                q.radius = (q.radius + f.radius_slope * f.to_zero.length().min(furthest)).max(0.0);
+                q.position += *fade * f.to_zero.clamp_length_max(furthest);
+                q.radius = (q.radius + fade * f.radius_slope * f.to_zero.length().min(furthest)).max(0.0);
             }
         }
         smooth(line, free[i], width_mm);
     });
+}
+
+/// How much of the fit counts at each point: 1 away from the ends and at thin ends, 0 at thick ones.
+fn fade(line: &[MedialPoint], closed: bool, regularised: &Regularised) -> Vec<f64> {
+    let mut fade = vec![1.0; line.len()];
+    if closed {
+        return fade;
+    }
+    let mut from_end = |indices: &mut dyn Iterator<Item = usize>| {
+        let (mut last, mut way, mut reach) = (None, 0.0, 0.0);
+        for i in indices {
+            let here = line[i].position;
+            match last {
+                None => {
+                    let tau = regularised.tolerance_at(line[i].radius);
+                    if line[i].radius <= THICK * tau {
+                        return;
+                    }
+                    reach = FADE * tau;
+                }
+                Some(before) => way += here.distance(before),
+            }
+            if way >= reach {
+                return;
+            }
+            fade[i] = fade[i].min(way / reach);
+            last = Some(here);
+        }
+    };
+    from_end(&mut (0..line.len()));
+    from_end(&mut (0..line.len()).rev());
+    fade
 }
 
 fn sample(fine: &FineScaffold, regularised: &Regularised, facet: u32) -> Sample {

@@ -248,6 +248,8 @@ impl<'a> Run<'a> {
             grow_sheets(&mut run.complex, &run.relative, least, least_axial, &whisker);
         });
         self.stage(Kind::GrowWires, |run| {
+            // Along a wire there is no sheet beside it to say where it ends.
+            let least = run.settings.fringe_erosion.max(least);
             grow_wires(&mut run.complex, &run.measure, &run.fire, least);
         });
         let mut cover = Cover::new(&self.complex, &self.measure, Some(cover.clone()));
