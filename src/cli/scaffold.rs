@@ -10,6 +10,7 @@ use medial_scaffold::coarse_scaffold::Host;
 use medial_scaffold::geometry::Rigid;
 use medial_scaffold::measures::thickness;
 use medial_scaffold::pipeline::{ScaffoldRun, scaffold};
+use medial_scaffold::regularise::Cost;
 use medial_scaffold::reports::{
     MedialMesh, PlyEncoding, Quantity, Scene, VertexField, colour, curves_polydata, glb_bytes,
     scaffold_report, sheets_polydata, write_bytes, write_json, write_ma, write_ply, write_vtp,
@@ -26,6 +27,26 @@ pub struct ScaffoldArgs {
     /// Output directory.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
+
+    /// What simplification goes by: lengths, or numbers of samples as in the first papers (they depend on the sampling).
+    #[arg(long, value_enum, default_value_t = CostArg::Length)]
+    cost: CostArg,
+}
+
+/// The choices of `--cost`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum CostArg {
+    Length,
+    Count,
+}
+
+impl From<CostArg> for Cost {
+    fn from(cost: CostArg) -> Self {
+        match cost {
+            CostArg::Length => Self::Length,
+            CostArg::Count => Self::Count,
+        }
+    }
 }
 
 /// Runs the command.
@@ -39,7 +60,8 @@ pub fn run(args: &ScaffoldArgs, common: &Common) -> Result<Verdict, Failure> {
     let progress = Progress::new(common.quiet);
     let mut last = Verdict::Fine;
     for &side in common.side.sides() {
-        let settings = common.scaffold_settings(side);
+        let mut settings = common.scaffold_settings(side);
+        settings.regularise.cost = args.cost.into();
         let done = scaffold(&shape, &settings, &|stage| progress.stage(stage))?;
         let mut record = RunRecord::new(common, &settings)?;
         record.inputs.push(shape.provenance.clone());
