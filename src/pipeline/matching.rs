@@ -1,6 +1,6 @@
 //! The way of two shapes: both scaffolds, the pose, who corresponds to whom, and how the shapes differ.
 //!
-//! 1. Scaffold of target and source. A shape without one (an open patch, a part of a bone) is matched by its surface alone, and the
+//! 1. Scaffold of target and source, side by side. A shape without one (an open patch, a part of a bone) is matched by its surface alone, and the
 //!    warnings say so.
 //! 2. Pose: hypotheses of the scaffolds and of the surfaces, decided on the surfaces.
 //! 3. Correspondences, edit path and shape distance in that pose.
@@ -72,13 +72,17 @@ pub fn match_shapes(
     observer: Observer,
 ) -> Result<MatchRun, PipelineError> {
     let path = |shape: &Shape| shape.provenance.path.display().to_string();
-    let mut stages = Vec::new();
-    let mut warnings = Vec::new();
-    let mut side = |shape: &Shape, role: &str| {
-        prepare(shape, role, settings, observer, &mut stages, &mut warnings).map_err(|e| e.of(&path(shape)))
-    };
-    let target_side = side(target, "target")?;
-    let source_side = side(source, "source")?;
+    // Each side keeps its own times and warnings, so that their order does not depend on who is done first.
+    let (target_done, source_done) = rayon::join(
+        || prepare(target, "target", settings, observer).map_err(|e| e.of(&path(target))),
+        || prepare(source, "source", settings, observer).map_err(|e| e.of(&path(source))),
+    );
+    let (target_done, source_done) = (target_done?, source_done?);
+    let (target_side, source_side) = (target_done.side, source_done.side);
+    let mut stages = target_done.stages;
+    stages.extend(source_done.stages);
+    let mut warnings = target_done.warnings;
+    warnings.extend(source_done.warnings);
     let mut late = Stages::new(observer, "");
     let registration = late
         .run("registration", || {
@@ -119,14 +123,20 @@ pub fn match_shapes(
     })
 }
 
+/// A side with what its preparation has to say.
+struct Prepared {
+    side: MatchSide,
+    stages: Vec<StageTime>,
+    warnings: Vec<String>,
+}
+
 fn prepare(
     shape: &Shape,
     role: &str,
     settings: &MatchSettings,
     observer: Observer,
-    stages: &mut Vec<StageTime>,
-    warnings: &mut Vec<String>,
-) -> Result<MatchSide, StageError> {
+) -> Result<Prepared, StageError> {
+    let (mut stages, mut warnings) = (Vec::new(), Vec::new());
     let (scaffold, why_not) = match scaffold::run(shape, &settings.scaffold, observer, &format!("{role} ")) {
         Ok(run) => (Some(run), None),
         // An open shape has no inside, hence no scaffold; its surface can still be matched.
@@ -151,10 +161,14 @@ fn prepare(
         }
         Geometry::Cloud(_) => scaffold.as_ref().map(|run| run.surface.clone()),
     };
-    Ok(MatchSide {
-        name: shape.name.clone(),
-        surface,
-        scaffold,
+    Ok(Prepared {
+        side: MatchSide {
+            name: shape.name.clone(),
+            surface,
+            scaffold,
+        },
+        stages,
+        warnings,
     })
 }
 
