@@ -363,7 +363,7 @@ fn a_page_holds_its_data_and_is_rebuilt_from_the_files_alone() {
     assert!(bare.notes.iter().any(|n| n.text.contains("scene.glb")));
     reports::write_bytes(&folder.file("scene.glb"), reports::glb_bytes(&scaffold_scene())).expect("writes");
     let again = reports::rebuild(dir).expect("rebuilds");
-    assert_eq!(again.title, "two <squares>");
+    assert_eq!(again.title, "Medial scaffold of two <squares>");
     assert_eq!((again.sections, again.figures), (report.sections, report.figures));
 
     std::fs::write(folder.file("scaffold.json"), "{").expect("writes");

@@ -1,13 +1,15 @@
 //! Several segmentations of the same lesions, compared with each other and with a reference.
 //!
 //! In: shapes in one frame, by name; optionally one of them as reference. Out: a [`Comparison`]: size of each, agreement of each
-//! pair (or of each with the reference), and for every label the coefficient of variation of its volume, which
-//! [`ChangeSettings::repeat_cv`] takes as the error of repeated segmentation. Cost: that of [`super::agreement`] for each pair.
+//! pair (or of each with the reference), and for every label the coefficient of variation of its volume; pooled over labels it is
+//! what [`ChangeSettings::repeat_cv`] takes as the error of repeated segmentation. Labels say which lesion is which, however lesions
+//! are paired over time. Cost: that of [`super::agreement`] for each pair.
 
 use super::agreement::{Agreement, agreement};
 use super::morphology::{Measures, measure};
 use super::region::{Region, regions};
-use super::{ChangeError, ChangeSettings};
+use super::{ChangeError, ChangeSettings, Pairing};
+use crate::geometry::TriangleMesh;
 use crate::input::shape::Shape;
 use serde::Serialize;
 
@@ -21,6 +23,9 @@ pub struct SegmentedLesion {
     /// Size and form.
     #[serde(flatten)]
     pub measures: Measures,
+    /// Its surface, LPS mm.
+    #[serde(skip)]
+    pub surface: TriangleMesh,
 }
 
 /// One lesion in two segmentations.
@@ -52,15 +57,30 @@ pub struct Repeatability {
     pub cv: Option<f64>,
 }
 
+/// Spread over all lesions.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PooledSpread {
+    /// Coefficient of variation of a volume: root mean square over lesions, weighted by degrees of freedom.
+    pub cv: f64,
+    /// Segmentations less one, summed over lesions: how well `cv` is known.
+    pub degrees_of_freedom: usize,
+}
+
 /// The result of [`compare`].
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Comparison {
-    /// Every lesion of every segmentation.
+    /// Name of the reference.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reference: Option<String>,
+    /// Every lesion of every segmentation; the reference first.
     pub lesions: Vec<SegmentedLesion>,
     /// Pairs, by label.
     pub pairs: Vec<SegmentationPair>,
     /// Spread, by label.
     pub repeatability: Vec<Repeatability>,
+    /// Spread over all labels; left out when no lesion was segmented twice.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pooled: Option<PooledSpread>,
 }
 
 /// Compares segmentations by label; with a reference, each of them with it, else each with each.
@@ -72,16 +92,24 @@ pub fn compare(
     reference: Option<&Shape>,
     settings: &ChangeSettings,
 ) -> Result<Comparison, ChangeError> {
+    let settings = &ChangeSettings {
+        pairing: Pairing::Label,
+        ..settings.clone()
+    };
     let mut found: Vec<(&str, Vec<Region>)> = Vec::new();
     for shape in reference.into_iter().chain(segmentations) {
         found.push((&shape.name, regions(shape, settings)?));
     }
-    let mut out = Comparison::default();
+    let mut out = Comparison {
+        reference: reference.map(|r| r.name.clone()),
+        ..Comparison::default()
+    };
     for (name, list) in &found {
         out.lesions.extend(list.iter().map(|r| SegmentedLesion {
             segmentation: (*name).to_owned(),
             label: r.label,
             measures: measure(r),
+            surface: r.surface.clone(),
         }));
     }
     let mut labels: Vec<i32> = out.lesions.iter().map(|l| l.label).collect();
@@ -111,6 +139,7 @@ pub fn compare(
             .collect();
         out.repeatability.push(spread(label, &volumes));
     }
+    out.pooled = pooled(&out.repeatability);
     Ok(out)
 }
 
@@ -149,4 +178,15 @@ fn spread(label: i32, volumes: &[f64]) -> Repeatability {
         mean_mm3: mean,
         cv,
     }
+}
+
+fn pooled(lesions: &[Repeatability]) -> Option<PooledSpread> {
+    let known = lesions.iter().filter_map(|r| Some((r.segmentations - 1, r.cv?)));
+    let (degrees_of_freedom, squares) = known.fold((0, 0.0), |(n, sum), (free, cv)| {
+        (n + free, sum + free as f64 * cv * cv)
+    });
+    (degrees_of_freedom > 0).then(|| PooledSpread {
+        cv: (squares / degrees_of_freedom as f64).sqrt(),
+        degrees_of_freedom,
+    })
 }

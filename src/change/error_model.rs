@@ -7,7 +7,8 @@
 //!    of side `u` that is `0.0666 S u^4`. It assumes that the surface faces all directions alike;
 //! 2. the boundary: displaced by the same unknown amount everywhere, with standard deviation `b`: `(S b)^2`. This is the
 //!    cautious end (independent displacements would average out). Not known otherwise, `b` is a voxel over the square root
-//!    of 12; with repeated segmentations it is replaced by their coefficient of variation.
+//!    of 12; with repeated segmentations it is replaced by their coefficient of variation,
+//!    widened by Student's distribution when they are few.
 //!
 //! The dates are independent. Volumes are positive, so the interval is made for the logarithm of their ratio.
 
@@ -19,6 +20,22 @@ use serde::{Deserialize, Serialize};
 
 /// Two-sided 95 % point of the normal distribution.
 const NORMAL_95: f64 = 1.959_963_984_540_054;
+
+/// Two-sided 95 % point of Student's distribution.
+fn student_95(degrees_of_freedom: usize) -> f64 {
+    const EXACT: [f64; 10] = [
+        12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228,
+    ];
+    match degrees_of_freedom {
+        0 => f64::INFINITY,
+        n @ 1..=10 => EXACT[n - 1],
+        // Cornish and Fisher's expansion to the second order; right to four digits from here on.
+        n => {
+            let (z, n) = (NORMAL_95, n as f64);
+            z + (z.powi(3) + z) / (4.0 * n) + (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / (96.0 * n * n)
+        }
+    }
+}
 
 /// Standard deviation of a volume and its parts, mm^3.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -113,7 +130,12 @@ pub fn volume_error(region: &Region, measures: &Measures, settings: &ChangeSetti
         (measures.area_smooth * digitisation_variance_per_area(m.spacing_mm)).sqrt()
     });
     let (boundary, boundary_sd_mm) = match settings.repeat_cv {
-        Some(cv) => (cv * measures.volume_best, 0.0),
+        Some(cv) => {
+            let wider = settings
+                .repeat_degrees_of_freedom
+                .map_or(1.0, |n| student_95(n) / NORMAL_95);
+            (wider * cv * measures.volume_best, 0.0)
+        }
         None => {
             let sd = boundary_sd_mm(region, settings);
             (measures.area_smooth * sd, sd)
@@ -162,6 +184,21 @@ mod tests {
         assert!((c - 0.06665).abs() < 3e-4, "{c}");
         let scaled = digitisation_variance_per_area(DVec3::splat(2.0));
         assert!((scaled / c - 16.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn few_repeats_widen_as_students_table_says() {
+        for (n, t) in [
+            (1, 12.706),
+            (5, 2.571),
+            (10, 2.228),
+            (11, 2.2010),
+            (20, 2.0860),
+            (60, 2.0003),
+        ] {
+            assert!((student_95(n) - t).abs() < 2e-4, "{n}: {}", student_95(n));
+        }
+        assert!((student_95(100_000) - NORMAL_95).abs() < 1e-4);
     }
 
     #[test]

@@ -31,11 +31,11 @@ pub mod slices;
 mod report;
 
 pub use agreement::{Agreement, SurfaceAgreement};
-pub use compare::{Comparison, compare};
+pub use compare::{Comparison, PooledSpread, compare};
 pub use error_model::{VolumeChange, VolumeError};
 pub use growth::{GrowthMap, GrowthSummary, Part, PartKind, SheetPair};
 pub use morphology::{Measures, ThicknessStatistics};
-pub use report::{Change, LesionChange, LoneLesion, Relation, Status, Totals};
+pub use report::{Alignment, Change, LesionChange, LoneLesion, Relation, Status, Totals};
 pub use response::{Assessment, Category, Response};
 pub use settings::{ChangeSettings, Pairing};
 
@@ -194,6 +194,7 @@ fn lesion_change(
         response: response::response(Burden::of(&baseline), Burden::of(&followup)),
         agreement: agreement::agreement(&b, &f, settings.surface_dice_tolerance_mm),
         growth: map.as_ref().map(|m| m.summary(direct)),
+        measures_change_percent: baseline.change_percent(&followup),
         baseline,
         followup,
         baseline_error: error_b,

@@ -18,6 +18,7 @@ use crate::geometry::TriangleMesh;
 use glam::DVec3;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Size and form of a lesion at one date; lengths mm, areas mm^2, volumes mm^3.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -72,6 +73,44 @@ pub struct Measures {
     /// Thickness over the sheets of the scaffold, when one was made.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub thickness: Option<ThicknessStatistics>,
+}
+
+impl Measures {
+    /// The measures that have a size to compare, by name; those that are not known are left out.
+    fn sizes(&self) -> Vec<(&'static str, f64)> {
+        let known = [
+            ("volume_voxel", self.volume_voxel),
+            ("volume_scaffold", self.volume_scaffold),
+        ];
+        let mut out = vec![
+            ("volume_best", self.volume_best),
+            ("volume_mesh", self.volume_mesh),
+            ("area", self.area),
+            ("area_smooth", self.area_smooth),
+            ("sphericity", self.sphericity),
+            ("surface_to_volume", self.surface_to_volume),
+            ("diameter_3d", self.diameter_3d),
+            ("diameter_axial", self.diameter_axial),
+            ("diameter_perpendicular", self.diameter_perpendicular),
+            ("axis_major", self.axis_major),
+            ("axis_minor", self.axis_minor),
+            ("axis_least", self.axis_least),
+            ("elongation", self.elongation),
+            ("flatness", self.flatness),
+        ];
+        out.extend(known.into_iter().filter_map(|(name, x)| Some((name, x?))));
+        out
+    }
+
+    /// The change of every measure that both dates have and the baseline has not zero, percent.
+    pub fn change_percent(&self, followup: &Measures) -> BTreeMap<&'static str, f64> {
+        let after: BTreeMap<&str, f64> = followup.sizes().into_iter().collect();
+        let of = |(name, a): (&'static str, f64)| {
+            let b = after.get(name)?;
+            (a != 0.0).then(|| (name, 100.0 * (b - a) / a))
+        };
+        self.sizes().into_iter().filter_map(of).collect()
+    }
 }
 
 /// [`SurfaceKind`] with a default, as measures need one.

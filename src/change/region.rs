@@ -337,9 +337,8 @@ fn mesh_regions(
 }
 
 fn label_regions(name: &str, map: &LabelMap, settings: &ChangeSettings) -> Result<Vec<Region>, ChangeError> {
-    let mut labels: Vec<i32> = map.values.iter().copied().filter(|v| *v != 0).collect();
-    labels.sort_unstable();
-    labels.dedup();
+    let mut labels: Vec<i32> = map.label_counts().into_iter().map(|c| c.label).collect();
+    labels.retain(|l| !settings.ignored_labels.contains(l));
     if labels.is_empty() {
         return Err(ChangeError::Empty {
             name: name.to_owned(),

@@ -2,6 +2,7 @@
 
 use super::ChangeSettings;
 use super::agreement::Agreement;
+use super::compare::Comparison;
 use super::error_model::{Uncertain, VolumeChange, VolumeError, volume_change};
 use super::growth::{GrowthMap, GrowthSummary, Part, SheetPair};
 use super::morphology::{Measures, ThicknessStatistics};
@@ -9,6 +10,7 @@ use super::response::{Burden, Response, response};
 use crate::coarse_scaffold::hypergraph::CoarseScaffold;
 use crate::geometry::{SheetId, TriangleMesh};
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// How the regions of the two dates make up a lesion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -39,6 +41,8 @@ pub struct LesionChange {
     pub baseline: Measures,
     /// Size and form at follow-up.
     pub followup: Measures,
+    /// Change of every measure that both dates have, percent of the baseline's, by its name.
+    pub measures_change_percent: BTreeMap<&'static str, f64>,
     /// How certain the baseline volume is.
     pub baseline_error: VolumeError,
     /// How certain the follow-up volume is.
@@ -153,6 +157,27 @@ pub struct Totals {
     pub response: Option<Response>,
 }
 
+/// How the follow-up was moved onto the baseline before anything was measured.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[allow(
+    non_snake_case,
+    reason = "frames are written as they are read: baseline from follow-up"
+)]
+pub struct Alignment {
+    /// What the dates were aligned on, in words.
+    pub on: String,
+    /// Takes coordinates of the follow-up's file to the baseline's, LPS mm, 4x4 row-major, column vectors.
+    pub T_baseline_followup: [[f64; 4]; 4],
+    /// Angle of the motion, degrees.
+    pub rotation_deg: f64,
+    /// How far the motion moves the centre of the structure, mm.
+    pub shift_mm: f64,
+    /// Symmetric root mean square distance of the structure's surfaces after it, mm.
+    pub rms_mm: f64,
+    /// Whether other poses fit about as well; the one nearest to the files' own frames was taken.
+    pub ambiguous: bool,
+}
+
 /// The result of [`super::change`], as `change.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Change {
@@ -168,6 +193,12 @@ pub struct Change {
     pub error_model: String,
     /// What the categories are, in words.
     pub response_note: String,
+    /// The motion of the follow-up, when it was aligned.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub alignment: Option<Alignment>,
+    /// Several segmentations of the baseline's date, when given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub segmentations: Option<Comparison>,
     /// Lesions of both dates.
     pub lesions: Vec<LesionChange>,
     /// Lesions of the follow-up only.
@@ -188,8 +219,11 @@ impl Change {
     pub(super) fn empty(settings: &ChangeSettings) -> Self {
         let boundary = match (settings.repeat_cv, settings.boundary_sd_mm) {
             (Some(cv), _) => format!(
-                "repeated segmentation (coefficient of variation {} %)",
-                100.0 * cv
+                "repeated segmentation (coefficient of variation {:.2} %{})",
+                100.0 * cv,
+                settings
+                    .repeat_degrees_of_freedom
+                    .map_or_else(String::new, |n| format!(", {n} degrees of freedom"))
             ),
             (None, Some(sd)) => format!("a boundary displaced alike everywhere, standard deviation {sd} mm"),
             (None, None) => "a boundary displaced alike everywhere, standard deviation one voxel (for meshes: edge) / sqrt(12)"
@@ -207,6 +241,8 @@ impl Change {
             response_note: "Research calculations by the published thresholds of RECIST 1.1, RANO and RANO 2.0 (volumetric); not a \
                             clinical reading."
                 .to_owned(),
+            alignment: None,
+            segmentations: None,
             lesions: Vec::new(),
             new: Vec::new(),
             vanished: Vec::new(),
@@ -214,6 +250,14 @@ impl Change {
             merged: Vec::new(),
             totals: Totals::default(),
             warnings: Vec::new(),
+        }
+    }
+
+    /// One date only: segmentations against each other.
+    pub fn of_segmentations(segmentations: Comparison, settings: &ChangeSettings) -> Self {
+        Self {
+            segmentations: Some(segmentations),
+            ..Self::empty(settings)
         }
     }
 

@@ -27,6 +27,11 @@ pub struct ChangeSettings {
     pub boundary_sd_mm: Option<f64>,
     /// Coefficient of variation of a lesion's volume under repeated segmentation, 0.05 for 5 %. Replaces the boundary term.
     pub repeat_cv: Option<f64>,
+    /// Degrees of freedom that `repeat_cv` was found with (segmentations less one, summed over lesions): few of them widen the
+    /// interval as Student's distribution asks. Not given: known well.
+    pub repeat_degrees_of_freedom: Option<usize>,
+    /// Labels that are no lesions: structures the dates were aligned on.
+    pub ignored_labels: Vec<i32>,
     /// Tolerance of the surface Dice coefficient, mm. 1 mm is the smallest of those used for organs by Nikolov et al. 2018.
     pub surface_dice_tolerance_mm: f64,
     /// Standard deviation of the smoothing kernel that turns a mask into a smooth surface, voxels along each axis. At 1.2
@@ -47,6 +52,8 @@ impl Default for ChangeSettings {
             label: None,
             boundary_sd_mm: None,
             repeat_cv: None,
+            repeat_degrees_of_freedom: None,
+            ignored_labels: Vec::new(),
             surface_dice_tolerance_mm: 1.0,
             smoothing_vox: 1.2,
             patch_threshold_sd: 2.45,

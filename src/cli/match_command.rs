@@ -13,7 +13,7 @@ use medial_scaffold::pipeline::{MatchRun, MatchSettings, match_shapes};
 use medial_scaffold::registration::{Extent, Mirror};
 use medial_scaffold::reports::{
     CorrespondenceLine, PlyEncoding, Quantity, Scene, VertexField, colour, glb_bytes, match_report,
-    write_bytes, write_json, write_ply, write_tfm,
+    write_bytes, write_json, write_ply, write_tables, write_tfm,
 };
 use std::path::{Path, PathBuf};
 
@@ -194,9 +194,10 @@ pub fn write_files(
     }
     write_bytes(&dir.join("scene.glb"), glb_bytes(&scene))?;
     record.write(dir)?;
+    let title = format!("{} on {}", done.source.name, done.target.name);
+    let report = match_report(&title, &json(&document)?, &json(record)?, scene)?;
+    write_tables(dir, &report)?;
     if !common.no_report {
-        let title = format!("{} on {}", done.source.name, done.target.name);
-        let report = match_report(&title, &json(&document)?, &json(record)?, scene)?;
         write_bytes(&dir.join("report.html"), report.html()?)?;
     }
     Ok(())

@@ -13,7 +13,7 @@ use medial_scaffold::pipeline::{ScaffoldRun, scaffold};
 use medial_scaffold::regularise::Cost;
 use medial_scaffold::reports::{
     MedialMesh, PlyEncoding, Quantity, Scene, VertexField, colour, curves_polydata, glb_bytes,
-    scaffold_report, sheets_polydata, write_bytes, write_json, write_ma, write_ply, write_vtp,
+    scaffold_report, sheets_polydata, write_bytes, write_json, write_ma, write_ply, write_tables, write_vtp,
 };
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -159,9 +159,10 @@ pub fn write_files(
     let scene = scene(done, &thickness);
     write_bytes(&dir.join("scene.glb"), glb_bytes(&scene))?;
     record.write(dir)?;
+    let title = format!("Medial scaffold of {}", done.name);
+    let report = scaffold_report(&title, &json(&document)?, &json(record)?, scene)?;
+    write_tables(dir, &report)?;
     if !common.no_report {
-        let title = format!("Medial scaffold of {}", done.name);
-        let report = scaffold_report(&title, &json(&document)?, &json(record)?, scene)?;
         write_bytes(&dir.join("report.html"), report.html()?)?;
     }
     Ok(())

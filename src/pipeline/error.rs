@@ -36,13 +36,15 @@ pub enum StageError {
     Regularise(#[from] RegulariseError),
     #[error(transparent)]
     Change(#[from] ChangeError),
+    #[error("{name}: a point cloud cannot be aligned on; give a mesh, or a mask")]
+    Structure { name: String },
     #[error(transparent)]
     Registration(#[from] RegistrationError),
 }
 
 impl StageError {
     /// Names the shape.
-    pub(super) fn of(self, shape: &str) -> PipelineError {
+    pub fn of(self, shape: &str) -> PipelineError {
         PipelineError {
             shape: shape.to_owned(),
             source: Box::new(self),

@@ -5,9 +5,9 @@
 
 use super::atomic::WriteError;
 use super::colour;
-use super::facts::{at, items, number, run_section, shown};
+use super::facts::{at, cell, items, number, run_section, shown, signed_cell};
 use super::mesh_files::{PlyEncoding, VertexField, write_ply};
-use super::page::{KeyFigure, NoteLevel, Plot, Report, ReportError, Section, Table};
+use super::page::{Cell, KeyFigure, NoteLevel, Plot, Report, ReportError, Section, Table};
 use super::plot::{IntervalRow, interval_plot, pretty, signed};
 use super::scene::{Layer, LayerKind, Quantity, Scene};
 use super::still::View;
@@ -87,6 +87,16 @@ pub fn change_scene(change: &Change) -> Scene {
             false,
         );
     }
+    let hidden = !change.lesions.is_empty();
+    for (n, l) in change
+        .segmentations
+        .iter()
+        .flat_map(|s| s.lesions.iter().enumerate())
+    {
+        let colour = colour::component_colour(n);
+        let shape = l.segmentation.as_str();
+        add(shape, l.label, shape, l.surface.clone(), colour, None, !hidden);
+    }
     scene
 }
 
@@ -157,7 +167,11 @@ pub fn change_report(title: &str, change: &Value, run: &Value, scene: Scene) -> 
     {
         report.note(NoteLevel::Warning, w);
     }
-    report.section(changes(change));
+    if !items(change, "lesions").is_empty() {
+        report.section(changes(change));
+    }
+    report.section(segmentations(change));
+    report.section(alignment(change));
     report.section(measures(change));
     report.section(agreement(change));
     report.section(responses(change));
@@ -186,7 +200,7 @@ fn figures(report: &mut Report, change: &Value) {
         ("Total volume, baseline", "baseline"),
         ("Total volume, follow-up", "followup"),
     ] {
-        if number(change, &format!("totals.{field}_mm3")).is_some() {
+        if number(change, &format!("totals.{field}_mm3")).is_some_and(|v| v > 0.0) {
             let value = shown(change, &format!("totals.{field}_mm3"));
             report.figures.push(KeyFigure::new(label, value, "mm\u{b3}"));
         }
@@ -198,6 +212,9 @@ fn figures(report: &mut Report, change: &Value) {
         report
             .figures
             .push(KeyFigure::new("Change", signed(percent), "%").note(note));
+    }
+    if items(change, "lesions").is_empty() {
+        return;
     }
     let significant = items(change, "lesions")
         .iter()
@@ -225,23 +242,22 @@ fn changes(change: &Value) -> Section {
             "follow-up [mm\u{b3}]",
             "change [mm\u{b3}]",
             "change [%]",
-            "95 % interval [%]",
+            "95 % interval from [%]",
+            "to [%]",
             ":beyond error",
         ],
     );
     for l in items(change, "lesions") {
         let ends = interval(l, "change.ci95_percent");
         table.row([
-            name(l),
-            shown(l, "baseline.volume_best"),
-            shown(l, "followup.volume_best"),
-            number(l, "change.volume_mm3").map_or_else(|| "-".to_owned(), signed),
-            number(l, "change.percent").map_or_else(|| "-".to_owned(), signed),
-            ends.map_or_else(
-                || "-".to_owned(),
-                |[lo, hi]| format!("{} to {}", signed(lo), signed(hi)),
-            ),
-            shown(l, "change.significant"),
+            name(l).into(),
+            cell(l, "baseline.volume_best"),
+            cell(l, "followup.volume_best"),
+            signed_cell(l, "change.volume_mm3"),
+            signed_cell(l, "change.percent"),
+            signed_cell(l, "change.ci95_percent.0"),
+            signed_cell(l, "change.ci95_percent.1"),
+            cell(l, "change.significant"),
         ]);
         if let (Some(value), Some(interval)) = (number(l, "change.percent"), ends) {
             rows.push(IntervalRow {
@@ -265,7 +281,7 @@ fn changes(change: &Value) -> Section {
 }
 
 /// Fields of a lesion at one date, with names and units.
-const MEASURES: [(&str, &str, &str); 14] = [
+const MEASURES: [(&str, &str, &str); 16] = [
     ("volume_mesh", "volume, marching cubes at 0.5", "mm\u{b3}"),
     ("volume_voxel", "volume, voxel count", "mm\u{b3}"),
     ("volume_scaffold", "volume, scaffold's surface", "mm\u{b3}"),
@@ -280,6 +296,8 @@ const MEASURES: [(&str, &str, &str); 14] = [
     ("axis_least", "least axis", "mm"),
     ("elongation", "elongation", ""),
     ("flatness", "flatness", ""),
+    ("thickness.mean", "mean thickness over the sheets", "mm"),
+    ("thickness.max", "largest thickness", "mm"),
 ];
 
 fn measures(change: &Value) -> Section {
@@ -297,12 +315,9 @@ fn measures(change: &Value) -> Section {
             if a.is_none() && b.is_none() {
                 continue;
             }
-            let percent = match (a, b) {
-                (Some(a), Some(b)) if a != 0.0 => signed(100.0 * (b - a) / a),
-                _ => "-".to_owned(),
-            };
-            let cell = |x: Option<f64>| x.map_or_else(|| "-".to_owned(), pretty);
-            table.row([word.to_owned(), cell(a), cell(b), percent, unit.to_owned()]);
+            let cell = |x: Option<f64>| x.map_or_else(Cell::missing, Cell::number);
+            let percent = signed_cell(l, &format!("measures_change_percent.{field}"));
+            table.row([word.into(), cell(a), cell(b), percent, unit.into()]);
         }
         section.tables.push(table);
     }
@@ -335,14 +350,14 @@ fn agreement(change: &Value) -> Section {
                 continue;
             };
             table.row([
-                name(l),
-                convention.to_owned(),
-                shown(l, "agreement.dice"),
-                shown(a, "hausdorff"),
-                shown(a, "hd95"),
-                shown(a, "assd"),
-                shown(a, "surface_dice"),
-                shown(l, "agreement.tolerance_mm"),
+                name(l).into(),
+                convention.into(),
+                cell(l, "agreement.dice"),
+                cell(a, "hausdorff"),
+                cell(a, "hd95"),
+                cell(a, "assd"),
+                cell(a, "surface_dice"),
+                cell(l, "agreement.tolerance_mm"),
             ]);
         }
     }
@@ -420,21 +435,21 @@ fn growth(change: &Value) -> Section {
     );
     for l in items(change, "lesions") {
         table.row([
-            name(l),
-            shown(l, "growth.max_outward"),
-            shown(l, "growth.max_inward"),
-            shown(l, "growth.mean"),
-            shown(l, "growth.identity_residual_percent"),
+            name(l).into(),
+            cell(l, "growth.max_outward"),
+            cell(l, "growth.max_inward"),
+            signed_cell(l, "growth.mean"),
+            signed_cell(l, "growth.identity_residual_percent"),
         ]);
         for p in items(l, "parts") {
             parts.row([
-                name(l),
-                shown(p, "name"),
-                number(p, "change_mm3").map_or_else(|| "-".to_owned(), signed),
-                shown(p, "share_percent"),
-                shown(p, "area_mm2"),
-                number(p, "mean_displacement_mm").map_or_else(|| "-".to_owned(), signed),
-                number(p, "radius_change_mm").map_or_else(|| "-".to_owned(), signed),
+                name(l).into(),
+                cell(p, "name"),
+                signed_cell(p, "change_mm3"),
+                cell(p, "share_percent"),
+                cell(p, "area_mm2"),
+                signed_cell(p, "mean_displacement_mm"),
+                signed_cell(p, "radius_change_mm"),
             ]);
         }
     }
@@ -469,5 +484,122 @@ fn unpaired(change: &Value) -> Section {
             section.paragraphs.push(sentence);
         }
     }
+    section
+}
+
+fn alignment(change: &Value) -> Section {
+    let mut section = Section::new("Alignment");
+    let Some(a) = at(change, "alignment") else {
+        return section;
+    };
+    section.paragraphs.push(format!(
+        "The follow-up was moved onto the baseline by {} before anything was measured: {} mm and {}\u{b0}; the structure's \
+         surfaces then lie {} mm apart (root mean square).",
+        shown(a, "on"),
+        shown(a, "shift_mm"),
+        shown(a, "rotation_deg"),
+        shown(a, "rms_mm")
+    ));
+    let mut matrix = Table::new(
+        "T_baseline_followup (LPS mm, column vectors)",
+        &["", "", "", "mm"],
+    );
+    for row in items(a, "T_baseline_followup") {
+        matrix.row((0..4).map(|j| {
+            number(row, &j.to_string()).map_or_else(Cell::missing, |x| Cell {
+                shown: format!("{x:.6}"),
+                exact: x.to_string(),
+            })
+        }));
+    }
+    section.tables.push(matrix);
+    section
+}
+
+fn segmentations(change: &Value) -> Section {
+    let mut section = Section::new("Segmentations of one date");
+    let Some(s) = at(change, "segmentations") else {
+        return section;
+    };
+    section
+        .paragraphs
+        .push(match at(s, "reference").and_then(Value::as_str) {
+            Some(truth) => format!("Each segmentation against the truth, {truth}."),
+            None => "Each segmentation against each other.".to_owned(),
+        });
+    if let Some(spread) = at(s, "pooled") {
+        section.paragraphs.push(format!(
+            "Repeated segmentation spreads the volume by {} % (coefficient of variation, {} degrees of freedom).",
+            pretty(100.0 * number(spread, "cv").unwrap_or(f64::NAN)),
+            shown(spread, "degrees_of_freedom")
+        ));
+    }
+    let mut sizes = Table::new(
+        "Size of each",
+        &[
+            "label",
+            ":segmentation",
+            "volume, voxel count [mm\u{b3}]",
+            "volume, mesh [mm\u{b3}]",
+            "area [mm\u{b2}]",
+            "sphericity",
+            "3D diameter [mm]",
+            "axial diameter [mm]",
+            "perpendicular [mm]",
+        ],
+    );
+    for l in items(s, "lesions") {
+        sizes.row(
+            [
+                "label",
+                "segmentation",
+                "volume_voxel",
+                "volume_mesh",
+                "area",
+                "sphericity",
+                "diameter_3d",
+                "diameter_axial",
+                "diameter_perpendicular",
+            ]
+            .map(|f| cell(l, f)),
+        );
+    }
+    let mut pairs = Table::new(
+        "Agreement (mesh: by area of the surfaces; voxel: by border voxels)",
+        &[
+            "label",
+            ":segmentation",
+            ":against",
+            "volume [%]",
+            "Dice",
+            ":convention",
+            "Hausdorff [mm]",
+            "HD95 [mm]",
+            "mean [mm]",
+            "surface Dice",
+            "at tolerance [mm]",
+        ],
+    );
+    for p in items(s, "pairs") {
+        for convention in ["mesh", "voxel"] {
+            let Some(a) = at(p, &format!("agreement.{convention}")) else {
+                continue;
+            };
+            pairs.row([
+                cell(p, "label"),
+                cell(p, "second"),
+                cell(p, "first"),
+                signed_cell(p, "volume_difference_percent"),
+                cell(p, "agreement.dice"),
+                convention.into(),
+                cell(a, "hausdorff"),
+                cell(a, "hd95"),
+                cell(a, "assd"),
+                cell(a, "surface_dice"),
+                cell(p, "agreement.tolerance_mm"),
+            ]);
+        }
+    }
+    section.tables.extend([sizes, pairs]);
     section
 }

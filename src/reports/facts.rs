@@ -1,12 +1,15 @@
 //! Reading results back from their JSON: the pages are built from the files, so that `medial report` can build them again
 //! and no number stands in a page that is not in its JSON.
 
-use super::page::{ReportError, Section, Table};
+use super::page::{Cell, ReportError, Section, Table};
 use super::plot::pretty;
 use serde_json::Value;
 
-/// The value at a path of field names separated by dots (array elements by index).
+/// The value at a path of field names separated by dots (array elements by index); the value itself for an empty path.
 pub fn at<'a>(value: &'a Value, path: &str) -> Option<&'a Value> {
+    if path.is_empty() {
+        return Some(value);
+    }
     path.split('.').try_fold(value, |v, key| match v {
         Value::Object(map) => map.get(key),
         Value::Array(items) => key.parse::<usize>().ok().and_then(|i| items.get(i)),
@@ -41,6 +44,27 @@ pub fn shown(value: &Value, path: &str) -> String {
     at(value, path).map_or_else(|| "-".to_owned(), text)
 }
 
+/// The value at a path as a cell of a table; a dash when it is not there.
+pub fn cell(value: &Value, path: &str) -> Cell {
+    match at(value, path) {
+        None | Some(Value::Null) => Cell::missing(),
+        Some(Value::Number(n)) => Cell {
+            shown: shown(value, path),
+            exact: n.to_string(),
+        },
+        Some(Value::Array(list)) if list.iter().all(Value::is_number) => Cell {
+            shown: shown(value, path),
+            exact: list.iter().map(Value::to_string).collect::<Vec<_>>().join(" "),
+        },
+        Some(other) => text(other).into(),
+    }
+}
+
+/// The number at a path as a cell with its sign; a dash when it is not there.
+pub fn signed_cell(value: &Value, path: &str) -> Cell {
+    number(value, path).map_or_else(Cell::missing, Cell::signed)
+}
+
 /// A plain value as text for people.
 pub fn text(value: &Value) -> String {
     match value {
@@ -68,7 +92,7 @@ pub struct Fact {
     /// Path of the field, names joined by dots.
     pub name: String,
     /// Its value.
-    pub value: String,
+    pub value: Cell,
 }
 
 /// How numbers of a record are shown.
@@ -105,8 +129,8 @@ fn gather(name: String, value: &Value, digits: Digits, out: &mut Vec<Fact>) {
         plain => out.push(Fact {
             name,
             value: match plain {
-                Value::Number(n) if digits == Digits::All => n.to_string(),
-                other => text(other),
+                Value::Number(n) if digits == Digits::All => n.to_string().into(),
+                other => cell(other, ""),
             },
         }),
     }
@@ -116,14 +140,17 @@ fn gather(name: String, value: &Value, digits: Digits, out: &mut Vec<Fact>) {
 pub fn facts_table(caption: &str, value: &Value, digits: Digits) -> Table {
     let mut table = Table::new(caption, &[":field", ":value"]);
     for f in facts(value, digits) {
-        table.row([f.name, f.value]);
+        table.row([f.name.into(), f.value]);
     }
     table
 }
 
 /// Settings, inputs, times and warnings of a run record.
 pub fn run_section(run: &Value) -> Section {
-    let mut section = Section::new("Settings and provenance");
+    let mut section = Section {
+        record: true,
+        ..Section::new("Settings and provenance")
+    };
     let Value::Object(map) = run else {
         return section;
     };

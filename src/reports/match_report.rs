@@ -3,8 +3,8 @@
 //! In: `match.json`, `run.json` and a scene whose layers are named by the shapes `target` and `source` (source layers already
 //! moved). Out: a [`Report`].
 
-use super::facts::{Digits, at, facts_table, items, number, run_section, shown, text};
-use super::page::{KeyFigure, NoteLevel, Report, ReportError, Section, Table};
+use super::facts::{Digits, at, cell, facts_table, items, number, run_section, shown, text};
+use super::page::{Cell, KeyFigure, NoteLevel, Report, ReportError, Section, Table};
 use super::plot::{pretty, signed};
 use super::scene::Scene;
 use crate::geometry::Rigid;
@@ -137,7 +137,10 @@ fn pose(r: &Value, motion: &Rigid) -> Section {
     );
     let mut matrix = Table::new("T_target_source", &["", "", "", "mm"]);
     for row in motion.to_rows() {
-        matrix.row(row.map(|x| format!("{x:.6}")));
+        matrix.row(row.map(|x| Cell {
+            shown: format!("{x:.6}"),
+            exact: x.to_string(),
+        }));
     }
     section.tables.push(matrix);
     let hypotheses = items(r, "hypotheses");
@@ -150,8 +153,11 @@ fn pose(r: &Value, motion: &Rigid) -> Section {
             let angle = transform(h)
                 .ok()
                 .filter(|t| t.is_mirrored() == motion.is_mirrored())
-                .map_or_else(|| "mirrored".to_owned(), |t| pretty(t.rotation_angle_deg(motion)));
-            table.row([(i + 1).to_string(), shown(h, "score"), angle]);
+                .map_or_else(
+                    || "mirrored".into(),
+                    |t| Cell::number(t.rotation_angle_deg(motion)),
+                );
+            table.row([(i + 1).to_string().into(), cell(h, "score"), angle]);
         }
         section.tables.push(table);
     }
@@ -174,7 +180,7 @@ fn difference(r: &Value) -> Section {
         } else {
             "mm"
         };
-        table.row([key.replace('_', " "), text(value), unit.to_owned()]);
+        table.row([key.replace('_', " ").into(), cell(value, ""), unit.into()]);
     }
     section.tables.push(table);
     let sheets = items(r, "difference.per_sheet");
@@ -197,7 +203,7 @@ fn difference(r: &Value) -> Section {
             &words,
         );
         for s in sheets {
-            table.row(names.iter().map(|n| shown(s, n)));
+            table.row(names.iter().map(|n| cell(s, n)));
         }
         section.tables.push(table);
     }
@@ -213,7 +219,7 @@ fn correspondences(r: &Value) -> Section {
         }
         let mut table = Table::new(word, &["target", "source", "weight"]);
         for c in list {
-            table.row(["target", "source", "weight"].map(|f| shown(c, f)));
+            table.row(["target", "source", "weight"].map(|f| cell(c, f)));
         }
         section.tables.push(table);
     }
@@ -248,7 +254,7 @@ fn edit(r: &Value) -> Section {
             let words = shown(o, "text");
             // The price has a column of its own.
             let what = words.rsplit_once(": ").map_or(words.as_str(), |w| w.0);
-            table.row([what.to_owned(), shown(o, "price")]);
+            table.row([what.into(), cell(o, "price")]);
         }
         section.tables.push(table);
     }

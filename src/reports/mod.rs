@@ -9,6 +9,7 @@
 //! - [`still`], [`plot`]: pictures without a GPU, plots as SVG;
 //! - [`page`]: one offline HTML page with viewer, tables and data inside;
 //! - [`facts`], [`mod@scaffold_report`], [`mod@match_report`], [`mod@change_report`]: the pages of the commands, from their JSON;
+//! - [`tables`]: the tables of a page as CSV files;
 //! - [`mod@rebuild`]: a page again from the files of a run.
 //!
 //! Coordinates are LPS mm in every file, and every format that can say so does. Bytes depend on the data alone.
@@ -27,6 +28,7 @@ pub mod rebuild;
 pub mod scaffold_report;
 pub mod scene;
 pub mod still;
+pub mod tables;
 pub mod vtp;
 
 pub use atomic::{WriteError, write_atomically, write_bytes, write_json};
@@ -37,9 +39,10 @@ pub use medial_files::{MedialMesh, write_csv, write_ma, write_tfm};
 pub use mesh_files::{
     FieldValues, PlyEncoding, VertexField, write_mesh, write_obj, write_off, write_ply, write_stl,
 };
-pub use page::{KeyFigure, NoteLevel, Plot, Report, ReportError, Section, Table};
+pub use page::{Cell, KeyFigure, NoteLevel, Plot, Report, ReportError, Section, Table};
 pub use rebuild::rebuild;
 pub use scaffold_report::scaffold_report;
 pub use scene::{CorrespondenceLine, Layer, LayerKind, Quantity, Scene};
 pub use still::View;
+pub use tables::write_tables;
 pub use vtp::{PolyData, curves_polydata, sheets_polydata, write_vtp};

@@ -7,6 +7,7 @@
 
 use super::colour::ColourScale;
 use super::glb::glb_bytes;
+use super::plot::{pretty, signed};
 use super::scene::{LayerKind, Scene};
 use super::still::{self, View};
 use crate::geometry::Rigid;
@@ -122,6 +123,56 @@ pub struct Column {
     pub text: bool,
 }
 
+/// A cell of a table: a number has few digits on the page and all of them in the CSV file.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Cell {
+    /// What stands on the page.
+    pub shown: String,
+    /// What stands in the CSV file.
+    pub exact: String,
+}
+
+impl Cell {
+    /// A number.
+    pub fn number(x: f64) -> Self {
+        Self {
+            shown: pretty(x),
+            exact: x.to_string(),
+        }
+    }
+
+    /// A number whose sign is always shown.
+    pub fn signed(x: f64) -> Self {
+        Self {
+            shown: signed(x),
+            exact: x.to_string(),
+        }
+    }
+
+    /// A dash on the page, nothing in the file.
+    pub fn missing() -> Self {
+        Self {
+            shown: "-".to_owned(),
+            exact: String::new(),
+        }
+    }
+}
+
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Self {
+            exact: text.clone(),
+            shown: text,
+        }
+    }
+}
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        text.to_owned().into()
+    }
+}
+
 /// A table.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Table {
@@ -129,8 +180,8 @@ pub struct Table {
     pub caption: String,
     /// Columns.
     pub columns: Vec<Column>,
-    /// Rows of cells as text, one a column.
-    pub rows: Vec<Vec<String>>,
+    /// Rows of cells, one a column.
+    pub rows: Vec<Vec<Cell>>,
 }
 
 impl Table {
@@ -159,8 +210,8 @@ impl Table {
     }
 
     /// Adds a row.
-    pub fn row(&mut self, cells: impl IntoIterator<Item = String>) {
-        self.rows.push(cells.into_iter().collect());
+    pub fn row<C: Into<Cell>>(&mut self, cells: impl IntoIterator<Item = C>) {
+        self.rows.push(cells.into_iter().map(Into::into).collect());
     }
 
     /// Names of the columns with units, as the header of a CSV file.
@@ -198,6 +249,8 @@ pub struct Section {
     pub plots: Vec<Plot>,
     /// Tables.
     pub tables: Vec<Table>,
+    /// Whether its tables are results, also written as CSV files; settings and provenance are not.
+    pub record: bool,
 }
 
 impl Section {

@@ -110,9 +110,15 @@ pub fn rebuild(folder: &Path) -> Result<Report, RebuildError> {
     })
 }
 
-/// The name in the result, or that of the folder.
+/// The heading that the command gave the page; without names in the result, that of the folder.
 fn title(result: &Value, folder: &Path) -> String {
-    let name = result.get("name").and_then(Value::as_str).map(str::to_owned);
-    name.or_else(|| folder.file_name().map(|n| n.to_string_lossy().into_owned()))
-        .unwrap_or_else(|| "result".to_owned())
+    let text = |field: &str| result.get(field).and_then(Value::as_str);
+    match (text("name"), text("source"), text("target")) {
+        (Some(name), _, _) => format!("Medial scaffold of {name}"),
+        (None, Some(source), Some(target)) => format!("{source} on {target}"),
+        _ if result.get("lesions").is_some() => "Change over time".to_owned(),
+        _ => folder
+            .file_name()
+            .map_or_else(|| "result".to_owned(), |n| n.to_string_lossy().into_owned()),
+    }
 }

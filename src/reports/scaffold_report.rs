@@ -3,8 +3,8 @@
 //! In: `scaffold.json`, `run.json` and the scene. Out: a [`Report`] with the bone, translucent, its sheets, curves and nodes;
 //! how many elements each tolerance keeps; tables of sheets, curves and nodes; topology and fidelity checks.
 
-use super::facts::{Digits, at, items, number, required, run_section, shown};
-use super::page::{KeyFigure, NoteLevel, Plot, Report, ReportError, Section, Table};
+use super::facts::{Digits, at, cell, items, number, required, run_section, shown};
+use super::page::{Cell, KeyFigure, NoteLevel, Plot, Report, ReportError, Section, Table};
 use super::plot::{Chart, Marker, Series, SeriesStyle, pretty};
 use super::scene::Scene;
 use serde_json::Value;
@@ -222,14 +222,14 @@ fn sheets(s: &Value) -> Section {
     );
     for x in items(s, "sheets") {
         table.row([
-            shown(x, "id"),
-            shown(x, "persistence"),
-            shown(x, "area"),
-            shown(x, "mean_radius"),
-            shown(x, "max_radius"),
-            number(x, "volume_share").map_or_else(|| "-".to_owned(), |v| pretty(100.0 * v)),
-            shown(x, "generators"),
-            items(x, "boundary").len().to_string(),
+            cell(x, "id"),
+            cell(x, "persistence"),
+            cell(x, "area"),
+            cell(x, "mean_radius"),
+            cell(x, "max_radius"),
+            number(x, "volume_share").map_or_else(Cell::missing, |v| Cell::number(100.0 * v)),
+            cell(x, "generators"),
+            items(x, "boundary").len().to_string().into(),
         ]);
     }
     if !table.rows.is_empty() {
@@ -253,7 +253,7 @@ fn curves(s: &Value) -> Section {
         ],
     );
     for x in items(s, "curves") {
-        table.row(["id", "kind", "persistence", "length", "closed", "nodes", "sheets"].map(|f| shown(x, f)));
+        table.row(["id", "kind", "persistence", "length", "closed", "nodes", "sheets"].map(|f| cell(x, f)));
     }
     if !table.rows.is_empty() {
         section.tables.push(table);
@@ -265,7 +265,7 @@ fn nodes(s: &Value) -> Section {
     let mut section = Section::new("Nodes");
     let mut table = Table::new("", &["node", ":type", "radius [mm]", ":position [mm]", ":curves"]);
     for x in items(s, "nodes") {
-        table.row(["id", "type", "radius", "position", "curves"].map(|f| shown(x, f)));
+        table.row(["id", "type", "radius", "position", "curves"].map(|f| cell(x, f)));
     }
     if !table.rows.is_empty() {
         section.tables.push(table);

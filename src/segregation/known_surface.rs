@@ -166,8 +166,10 @@ pub fn segregate_known(
             settings.max_places,
         );
         warnings.push(format!(
-            "the segregated surface has Euler numbers {found_euler:?}, the known surface {expected_euler:?}; {} non-manifold \
+            "the segregated surface has {}, the known surface {}; {} non-manifold \
              edges and {} non-manifold vertices; {} places ask for finer sampling",
+            eulers_in_words(&found_euler),
+            eulers_in_words(&expected_euler),
             found.nonmanifold_edges,
             found.nonmanifold_vertices,
             needs_refinement.len()
@@ -256,6 +258,20 @@ pub(super) fn label_flat(triangulation: &Triangulation, flat: &[bool], inside: &
             inside[tet.index()] = all_inside;
         }
     }
+}
+
+/// Euler numbers of components for a message: each of a few, the sum of many.
+fn eulers_in_words(eulers: &[i64]) -> String {
+    const SHOWN: usize = 6;
+    if eulers.len() <= SHOWN {
+        return format!("Euler numbers {eulers:?}");
+    }
+    format!(
+        "{} components with Euler numbers {} in all ({} of them other than a sphere's 2)",
+        eulers.len(),
+        eulers.iter().sum::<i64>(),
+        eulers.iter().filter(|e| **e != 2).count()
+    )
 }
 
 /// Euler numbers of the connected components, sorted.
