@@ -82,7 +82,7 @@ fn damaged_files_exit_2_and_are_named() {
 }
 
 #[test]
-fn check_says_no_to_an_open_mesh_and_yes_to_a_closed_one() {
+fn check_says_what_an_open_mesh_is_fit_for() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let mut mesh = support::bone();
     let good = dir.path().join("closed.ply");
@@ -92,12 +92,21 @@ fn check_says_no_to_an_open_mesh_and_yes_to_a_closed_one() {
     serde_json::from_slice::<serde_json::Value>(&out.stdout).expect("stdout is JSON and nothing else");
 
     mesh.triangles.truncate(mesh.triangles.len() * 2 / 3);
-    let bad = dir.path().join("open.ply");
-    write_ply(&bad, &mesh);
-    assert_eq!(
-        medial(&["check", bad.to_str().expect("utf-8")]).status.code(),
-        Some(1)
+    let open = dir.path().join("open.ply");
+    write_ply(&open, &mesh);
+    let open = open.to_str().expect("utf-8");
+    let out = medial(&["check", open]);
+    let text = String::from_utf8_lossy(&out.stdout).into_owned();
+    assert_eq!(out.status.code(), Some(0), "{text}");
+    assert!(
+        text.contains("scaffold: yes") && text.contains("change: NO"),
+        "{text}"
     );
+    assert_eq!(
+        medial(&["check", open, "--for", "scaffold"]).status.code(),
+        Some(0)
+    );
+    assert_eq!(medial(&["check", open, "--for", "change"]).status.code(), Some(1));
 }
 
 #[test]

@@ -385,3 +385,87 @@ fn a_page_holds_its_data_and_is_rebuilt_from_the_files_alone() {
     let error = reports::scaffold_report("x", &cut, &run, Scene::default()).expect_err("no counts");
     assert!(error.to_string().contains("counts.sheets"), "{error}");
 }
+
+/// Every number of a value, as text.
+fn numbers(value: &serde_json::Value, out: &mut std::collections::BTreeSet<String>) {
+    match value {
+        serde_json::Value::Number(n) => {
+            let x = n.as_f64().expect("a number");
+            out.insert(x.to_string());
+        }
+        serde_json::Value::Array(list) => list.iter().for_each(|v| numbers(v, out)),
+        serde_json::Value::Object(map) => map.values().for_each(|v| numbers(v, out)),
+        _ => {}
+    }
+}
+
+#[test]
+fn every_number_in_the_tables_of_a_change_is_in_its_json_and_in_the_csv() {
+    use medial_scaffold::change::{ChangeSettings, change};
+    use medial_scaffold::input::{Geometry, Shape};
+    let ball = |radius: f64| {
+        let mut mesh = TriangleMesh::default();
+        let (rings, around) = (24u32, 48u32);
+        for i in 0..=rings {
+            for j in 0..around {
+                let (a, b) = (
+                    std::f64::consts::PI * f64::from(i) / f64::from(rings),
+                    std::f64::consts::TAU * f64::from(j) / f64::from(around),
+                );
+                mesh.points
+                    .push(radius * DVec3::new(a.sin() * b.cos(), a.sin() * b.sin(), a.cos()));
+            }
+        }
+        // The rings at the poles shrink to one point each.
+        let at = |i: u32, j: u32| match i {
+            0 => 0,
+            i if i == rings => rings * around,
+            i => i * around + j % around,
+        };
+        for i in 0..rings {
+            for j in 0..around {
+                let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+                mesh.triangles.extend(
+                    [[a, b, c], [a, c, d]]
+                        .into_iter()
+                        .filter(|t| t[0] != t[1] && t[1] != t[2] && t[0] != t[2]),
+                );
+            }
+        }
+        Shape::generated("ball", Geometry::Mesh(mesh))
+    };
+    let found = change(&ball(8.0), &ball(9.0), &ChangeSettings::default()).expect("two solids");
+    let json = serde_json::to_value(&found).expect("JSON");
+    let scene = reports::change_scene(&found);
+    let report = reports::change_report("x", &json, &serde_json::Value::Null, scene).expect("a report");
+    let mut known = std::collections::BTreeSet::new();
+    numbers(&json, &mut known);
+    let mut checked = 0;
+    for table in report.sections.iter().flat_map(|s| &s.tables) {
+        for cell in table.rows.iter().flatten() {
+            if let Ok(x) = cell.exact.parse::<f64>() {
+                assert!(
+                    known.contains(&x.to_string()),
+                    "{}: {} is not in the JSON",
+                    table.caption,
+                    cell.exact
+                );
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked > 40, "{checked}");
+    let folder = Folder::new();
+    let files = reports::write_tables(folder.dir.path(), &report).expect("writes");
+    let names: Vec<String> = files
+        .iter()
+        .map(|f| f.file_name().expect("a name").to_string_lossy().into_owned())
+        .collect();
+    assert!(names.contains(&"volume-change.csv".to_owned()), "{names:?}");
+    let text = std::fs::read_to_string(folder.file("tables/volume-change.csv")).expect("reads");
+    assert!(text.starts_with("lesion,baseline [mm\u{b3}],"), "{text}");
+    assert!(
+        text.contains(&found.lesions[0].change.percent.to_string()),
+        "{text}"
+    );
+}

@@ -131,6 +131,14 @@ pub fn growth_map(baseline: &TriangleMesh, followup: &TriangleMesh) -> Option<Gr
     })
 }
 
+/// How far each vertex of the follow-up surface lies from the baseline surface, mm, outside positive; `None` when the baseline has no
+/// triangle. It shows what no line from the baseline reaches: a lobe far out, a new arm.
+pub fn followup_distances(baseline: &TriangleMesh, followup: &TriangleMesh) -> Option<Vec<f64>> {
+    let distance = SignedDistance::new(baseline)?;
+    let points = followup.points.par_iter();
+    Some(points.map(|p| distance.signed_distance(*p)).collect())
+}
+
 /// Signed volume between a triangle and its moved copy.
 fn prism(triangle: [u32; 3], from: &[DVec3], to: &[DVec3]) -> f64 {
     // Sorted by index, so that neighbours cut the wall between them along the same diagonal; an odd sort turns the triangle.

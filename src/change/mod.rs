@@ -118,7 +118,11 @@ pub fn change(baseline: &Shape, followup: &Shape, settings: &ChangeSettings) -> 
     let before = regions(baseline, settings)?;
     let after = regions(followup, settings)?;
     check_frames(baseline, &before, followup, &after)?;
-    let mut out = Change::empty(settings);
+    let mut out = Change {
+        baseline_name: baseline.name.clone(),
+        followup_name: followup.name.clone(),
+        ..Change::empty(settings)
+    };
     for group in pairing::pair(&before, &after, settings.pairing) {
         let pick = |list: &[usize], from: &'_ [Region]| -> Vec<Region> {
             list.iter().map(|i| from[*i].clone()).collect()
@@ -181,6 +185,17 @@ fn lesion_change(
             ));
         }
     }
+    let growth = map.as_ref().map(|m| m.summary(direct));
+    if let Some(residual) = growth.and_then(|g| g.identity_residual_percent)
+        && residual.abs() > MOST_RESIDUAL_PERCENT
+    {
+        warnings.push(format!(
+            "lesion {}: displacement of the baseline's surface accounts for {:.0} % of the change; the rest lies where no line from \
+             that surface reaches (a lobe, an arm): see the follow-up's surface",
+            b.label,
+            100.0 + residual * direct.signum()
+        ));
+    }
     LesionChange {
         label: b.label,
         status: match (group.baseline.len(), group.followup.len()) {
@@ -193,7 +208,8 @@ fn lesion_change(
         followup_labels: after.iter().map(|r| r.label).collect(),
         response: response::response(Burden::of(&baseline), Burden::of(&followup)),
         agreement: agreement::agreement(&b, &f, settings.surface_dice_tolerance_mm),
-        growth: map.as_ref().map(|m| m.summary(direct)),
+        growth,
+        followup_distance_mm: growth::followup_distances(&b.surface, &f.surface).unwrap_or_default(),
         measures_change_percent: baseline.change_percent(&followup),
         baseline,
         followup,
@@ -208,6 +224,9 @@ fn lesion_change(
         followup_surface: f.surface,
     }
 }
+
+/// A growth map that leaves out more of the change than this is said to, percent. Chords and folds cost a percent or two.
+const MOST_RESIDUAL_PERCENT: f64 = 5.0;
 
 /// By how much each vertex of a growth map must move to count as changed, mm.
 fn patch_thresholds_mm(map: &GrowthMap, b: &Region, f: &Region, settings: &ChangeSettings) -> Vec<f64> {

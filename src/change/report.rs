@@ -72,6 +72,9 @@ pub struct LesionChange {
     /// Surface at follow-up, LPS mm.
     #[serde(skip)]
     pub followup_surface: TriangleMesh,
+    /// Signed distance of its vertices from the baseline's surface, mm, outside positive.
+    #[serde(skip)]
+    pub followup_distance_mm: Vec<f64>,
 }
 
 impl LesionChange {
@@ -189,6 +192,10 @@ pub struct Change {
     pub units: String,
     /// `LPS`.
     pub frame: String,
+    /// Name of the baseline; empty when only segmentations of one date were compared.
+    pub baseline_name: String,
+    /// Name of the follow-up.
+    pub followup_name: String,
     /// What the interval rests on, in words.
     pub error_model: String,
     /// What the categories are, in words.
@@ -234,6 +241,8 @@ impl Change {
             version: 1,
             units: "mm".to_owned(),
             frame: "LPS".to_owned(),
+            baseline_name: String::new(),
+            followup_name: String::new(),
             error_model: format!(
                 "95 % interval of the log ratio of two independent volumes; variance of each: counting voxels on a randomly placed \
                  grid (Matheron), plus {boundary}"

@@ -15,6 +15,7 @@ use medial_scaffold::pipeline::{
     Aligned, ChangeRunSettings, align_on, change_of, move_shape, structure_surface,
 };
 use medial_scaffold::registration::RegistrationSettings;
+use medial_scaffold::reports::change_report::title;
 use medial_scaffold::reports::{
     change_report, change_scene, glb_bytes, write_bytes, write_growth, write_json, write_tables, write_tfm,
 };
@@ -321,7 +322,8 @@ fn write_files(dir: &Path, change: &Change, record: &mut RunRecord, common: &Com
     let scene = change_scene(change);
     write_bytes(&dir.join("scene.glb"), glb_bytes(&scene))?;
     record.write(dir)?;
-    let report = change_report("Change over time", &json(change)?, &json(record)?, scene)?;
+    let document = json(change)?;
+    let report = change_report(&title(&document), &document, &json(record)?, scene)?;
     write_tables(dir, &report)?;
     if !common.no_report {
         write_bytes(&dir.join("report.html"), report.html()?)?;

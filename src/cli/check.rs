@@ -1,10 +1,10 @@
-//! `medial check`: what is in each file, is it usable; exit 1 if one is not.
+//! `medial check`: what is in each file and what it can be used for; exit 1 if one is fit for nothing (or not for what is asked).
 
 use super::common::Common;
 use super::output::{print_json, print_text};
 use super::{Failure, Verdict};
-use clap::Args;
-use medial_scaffold::input::check::{CheckContent, CheckReport, Severity, check};
+use clap::{Args, ValueEnum};
+use medial_scaffold::input::check::{CheckContent, CheckReport, Purpose, Severity, check};
 use std::path::PathBuf;
 
 /// Arguments of `medial check`.
@@ -13,6 +13,30 @@ pub struct CheckArgs {
     /// Files to look at.
     #[arg(required = true)]
     shapes: Vec<PathBuf>,
+
+    /// Say no (exit 1) unless every file is fit for this; without it, unless it is fit for anything.
+    #[arg(long = "for", value_enum, value_name = "USE")]
+    purpose: Option<PurposeOption>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum PurposeOption {
+    Scaffold,
+    Match,
+    Change,
+}
+
+impl CheckArgs {
+    /// Whether a file is fit for what it is wanted for.
+    fn fit(&self, report: &CheckReport) -> bool {
+        let wanted = match self.purpose {
+            None => return report.usable,
+            Some(PurposeOption::Scaffold) => Purpose::Scaffold,
+            Some(PurposeOption::Match) => Purpose::Match,
+            Some(PurposeOption::Change) => Purpose::Change,
+        };
+        report.uses.iter().any(|u| u.purpose == wanted && u.fit)
+    }
 }
 
 /// Runs the command: every file is looked at, even after one that cannot be read.
@@ -43,7 +67,7 @@ pub fn run(args: &CheckArgs, common: &Common) -> Result<Verdict, Failure> {
     }
     match unreadable {
         Some(_) => Err(Failure::usage("not every file could be read, see above")),
-        None if reports.iter().all(|r| r.usable) => Ok(Verdict::Fine),
+        None if reports.iter().all(|r| args.fit(r)) => Ok(Verdict::Fine),
         None => Ok(Verdict::SaidNo),
     }
 }
@@ -54,10 +78,10 @@ fn text(report: &CheckReport) -> String {
     let mut out = format!(
         "{}: {}\n  frame {}, units {}; box {:.3} x {:.3} x {:.3} mm\n",
         p.path.display(),
-        if report.usable {
-            "usable"
-        } else {
-            "NOT usable as it is"
+        match (report.usable, report.uses.iter().all(|u| u.fit)) {
+            (true, true) => "usable",
+            (true, false) => "usable, but not for everything",
+            (false, _) => "NOT usable as it is",
         },
         p.frame,
         p.units,
@@ -101,6 +125,14 @@ fn text(report: &CheckReport) -> String {
             text
         }
     };
+    for u in &report.uses {
+        let word = match u.purpose {
+            Purpose::Scaffold => "scaffold",
+            Purpose::Match => "match",
+            Purpose::Change => "change",
+        };
+        out += &format!("  {word}: {}, {}\n", if u.fit { "yes" } else { "NO" }, u.why);
+    }
     for problem in &report.problems {
         let word = match problem.severity {
             Severity::Error => "error",

@@ -37,7 +37,7 @@ struct Cli {
 enum Command {
     /// Make two carpal-like bones, match them and report: no input needed.
     Demo(demo::DemoArgs),
-    /// What is in a file, is it usable, in which frame and units; exit 1 if not.
+    /// What is in a file, in which frame and units, and what it can be used for; exit 1 if for nothing.
     Check(check::CheckArgs),
     /// Surface mesh of a point cloud, by segregation.
     Mesh(mesh::MeshArgs),

@@ -1,8 +1,8 @@
 //! Looking at a shape before any work: what is in the file, and is it usable.
 //!
-//! In: a [`Shape`] as read. Out: a [`CheckReport`] with counts, sizes, orientation, self-intersections, labels, and a list of
-//! problems with their remedies. Nothing is changed. `usable` is false when a problem of severity `error` is in the list: then a
-//! solid cannot be made of the shape as it is.
+//! In: a [`Shape`] as read. Out: a [`CheckReport`] with counts, sizes, orientation, self-intersections, labels, a list of
+//! problems with their remedies, and for each use whether the shape is fit for it and why. Nothing is changed. `usable` is false
+//! when it is fit for none: an open or one-sided sheet has a scaffold, though no volume to change.
 //!
 //! Cost `O(n log n)`; self-intersections by bounding boxes, exact signs decide.
 
@@ -31,10 +31,35 @@ pub struct CheckReport {
     pub bounds_mm: [[f64; 3]; 2],
     /// What it holds.
     pub content: CheckContent,
-    /// Whether a solid or a surface can be made of it as it is.
+    /// Whether it is fit for any use as it is.
     pub usable: bool,
+    /// What it can be used for, and what not.
+    pub uses: Vec<Use>,
     /// What is wrong or worth knowing, the worst first.
     pub problems: Vec<Problem>,
+}
+
+/// What a shape may be wanted for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Purpose {
+    /// A scaffold, and what is measured on it.
+    Scaffold,
+    /// Registration and matching.
+    Match,
+    /// Change of volume over time.
+    Change,
+}
+
+/// Whether a shape is fit for a purpose as it is.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Use {
+    /// The purpose.
+    pub purpose: Purpose,
+    /// Whether it is.
+    pub fit: bool,
+    /// How it will be taken, or what stands against it and what to do.
+    pub why: String,
 }
 
 /// The three kinds of content.
@@ -175,13 +200,84 @@ pub fn check(shape: &Shape) -> CheckReport {
         ),
     };
     problems.sort_by_key(|p| p.severity); // stable: within one severity in the order found
+    let useless = problems.iter().any(|p| p.severity == Severity::Error);
+    let uses = uses(&content, useless);
     CheckReport {
         name: shape.name.clone(),
         provenance: shape.provenance.clone(),
         bounds_mm: corners.unwrap_or_default().map(|c| c.to_array()),
         content,
-        usable: problems.iter().all(|p| p.severity != Severity::Error),
+        usable: uses.iter().any(|u| u.fit),
+        uses,
         problems,
+    }
+}
+
+/// What the stages make of the content.
+fn uses(content: &CheckContent, useless: bool) -> Vec<Use> {
+    let wanted = [Purpose::Scaffold, Purpose::Match, Purpose::Change];
+    let say = |purpose, (fit, why): (bool, &str)| Use {
+        purpose,
+        fit,
+        why: why.to_owned(),
+    };
+    let all = |answers: [(bool, &str); 3]| {
+        let pairs = wanted.into_iter().zip(answers);
+        pairs.map(|(purpose, answer)| say(purpose, answer)).collect()
+    };
+    if useless {
+        return all([(false, "nothing can be made of it, see the error"); 3]);
+    }
+    let mesh = match content {
+        CheckContent::Labels(_) => return all([(true, "as the solid of its voxels"); 3]),
+        CheckContent::Cloud(_) => {
+            return all([
+                (
+                    true,
+                    "as points: the surface is found, closed or not (`medial mesh --open` keeps it open)",
+                ),
+                (true, "as points"),
+                (
+                    false,
+                    "points enclose no volume: make a closed mesh first (`medial mesh --closed`)",
+                ),
+            ]);
+        }
+        CheckContent::Mesh(mesh) => mesh,
+    };
+    let t = &mesh.topology;
+    match mesh.orientation {
+        Orientation::Inconsistent => all([
+            (
+                false,
+                "its inside is not known while triangles look both ways: --repair turns them",
+            ),
+            (true, "by its points and faces; --repair makes the sides certain"),
+            (
+                false,
+                "it encloses no certain volume: --repair turns the triangles",
+            ),
+        ]),
+        _ if t.boundary_edges > 0 || mesh.orientation == Orientation::OneSided => all([
+            (
+                true,
+                "as a sheet that bounds nothing: the cloud of its points (`medial mesh --open` keeps it open)",
+            ),
+            (true, "as a part of a surface"),
+            (
+                false,
+                "it encloses no volume: close it (--repair when points are doubled, `medial mesh --closed` else)",
+            ),
+        ]),
+        _ if t.nonmanifold_edges > 0 => all([
+            (true, "as a solid, its inside by the winding number"),
+            (true, "as a surface"),
+            (
+                false,
+                "volume asks for two triangles at every edge: --repair, or `medial mesh --closed` on its points",
+            ),
+        ]),
+        _ => all([(true, "as a closed solid"); 3]),
     }
 }
 
@@ -273,7 +369,7 @@ fn mesh_problems(m: &MeshCheck, problems: &mut Vec<Problem>) {
     );
     push(
         t.boundary_edges > 0,
-        Severity::Error,
+        Severity::Warning,
         format!(
             "the surface is open: {} edges have one triangle",
             t.boundary_edges
@@ -282,19 +378,19 @@ fn mesh_problems(m: &MeshCheck, problems: &mut Vec<Problem>) {
     );
     push(
         t.nonmanifold_edges > 0,
-        Severity::Error,
+        Severity::Warning,
         format!("{} edges have three or more triangles", t.nonmanifold_edges),
         repair,
     );
     push(
         m.orientation == Orientation::OneSided,
-        Severity::Error,
+        Severity::Warning,
         "the surface is one-sided".into(),
         "it has no inside: treat it as an open surface",
     );
     push(
         m.orientation == Orientation::Inconsistent,
-        Severity::Error,
+        Severity::Warning,
         "some triangles look the other way than their neighbours".into(),
         repair,
     );

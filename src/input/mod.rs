@@ -19,7 +19,7 @@ mod scalar;
 mod scan;
 pub mod shape;
 
-pub use check::{CheckContent, CheckReport, Problem, Severity, check};
+pub use check::{CheckContent, CheckReport, Problem, Purpose, Severity, Use, check};
 pub use error::{Fault, Flaw, Place, ReadError};
 pub use parsed::{Frame, Units};
 pub use read::{ReadSettings, read_bytes, read_shape};

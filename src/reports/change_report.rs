@@ -16,14 +16,15 @@ use glam::DVec3;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
-/// The scene of a change: baseline surfaces coloured by growth on one scale, follow-up surfaces to be switched on, new and
-/// vanished lesions plain.
+/// The scene of a change: baseline surfaces coloured by their displacement, follow-up surfaces by their distance from the baseline, on
+/// one scale, the follow-up to be switched on; new and vanished lesions plain.
 pub fn change_scene(change: &Change) -> Scene {
     let mut scene = Scene::default();
     let all: Vec<f32> = change
         .lesions
         .iter()
-        .flat_map(|l| l.growth_map.displacement_mm.iter().map(|h| *h as f32))
+        .flat_map(|l| l.growth_map.displacement_mm.iter().chain(&l.followup_distance_mm))
+        .map(|h| *h as f32)
         .collect();
     let range = Quantity::signed("growth", "mm", all).range;
     let mut add = |what: &str, label: i32, shape: &str, mesh, colour, quantity, visible| {
@@ -54,6 +55,9 @@ pub fn change_scene(change: &Change) -> Scene {
             Some(growth),
             true,
         );
+        let values = l.followup_distance_mm.iter().map(|h| *h as f32).collect();
+        let mut distance = Quantity::signed("growth", "mm", values);
+        distance.range = range;
         let mesh = l.followup_surface.clone();
         add(
             "follow-up",
@@ -61,7 +65,7 @@ pub fn change_scene(change: &Change) -> Scene {
             "followup",
             mesh,
             colour::SECOND,
-            None,
+            Some(distance),
             false,
         );
     }
@@ -139,12 +143,7 @@ pub fn change_report(title: &str, change: &Value, run: &Value, scene: Scene) -> 
     let mut report = Report {
         kind: "Change over time".to_owned(),
         title: title.to_owned(),
-        subtitle: format!(
-            "{} paired, {} new, {} vanished",
-            items(change, "lesions").len(),
-            items(change, "new").len(),
-            items(change, "vanished").len()
-        ),
+        subtitle: subtitle(change),
         surface_colours: scene
             .layers
             .iter()
@@ -179,6 +178,34 @@ pub fn change_report(title: &str, change: &Value, run: &Value, scene: Scene) -> 
     report.section(unpaired(change));
     report.section(run_section(run));
     Ok(report)
+}
+
+/// The heading of the page: both dates by their names.
+pub fn title(change: &Value) -> String {
+    let text = |key: &str| at(change, key).and_then(Value::as_str).filter(|t| !t.is_empty());
+    match (text("baseline_name"), text("followup_name")) {
+        (Some(before), Some(after)) => format!("{before} \u{2192} {after}"),
+        _ => "Segmentations compared".to_owned(),
+    }
+}
+
+/// Which lesions were found; the segmentations, when it is about one date only.
+fn subtitle(change: &Value) -> String {
+    let count = |key: &str| items(change, key).len();
+    if count("lesions") + count("new") + count("vanished") == 0 && at(change, "segmentations").is_some() {
+        return "Segmentations of one date against each other".to_owned();
+    }
+    let lesions = if count("lesions") == 1 {
+        "lesion"
+    } else {
+        "lesions"
+    };
+    format!(
+        "{} {lesions} at both dates, {} new, {} vanished",
+        count("lesions"),
+        count("new"),
+        count("vanished")
+    )
 }
 
 fn name(lesion: &Value) -> String {
@@ -408,7 +435,7 @@ fn growth(change: &Value) -> Section {
     let mut section = Section::new("Where it changed");
     section.paragraphs.push(
         "Signed distance from the baseline surface to the follow-up surface, outward positive; the picture above shows it on \
-         the baseline. The residual compares the volume that these distances imply with the change measured directly."
+         the baseline, and on the follow-up each point's distance from the baseline's surface. The residual compares the volume that these distances imply with the change measured directly."
             .to_owned(),
     );
     let mut table = Table::new(
@@ -427,7 +454,7 @@ fn growth(change: &Value) -> Section {
             ":lesion",
             ":part",
             "change [mm\u{b3}]",
-            "share of change [%]",
+            "share of what moved [%]",
             "area [mm\u{b2}]",
             "mean displacement [mm]",
             "change of mean radius [mm]",

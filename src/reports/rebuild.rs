@@ -116,7 +116,7 @@ fn title(result: &Value, folder: &Path) -> String {
     match (text("name"), text("source"), text("target")) {
         (Some(name), _, _) => format!("Medial scaffold of {name}"),
         (None, Some(source), Some(target)) => format!("{source} on {target}"),
-        _ if result.get("lesions").is_some() => "Change over time".to_owned(),
+        _ if result.get("lesions").is_some() => super::change_report::title(result),
         _ => folder
             .file_name()
             .map_or_else(|| "result".to_owned(), |n| n.to_string_lossy().into_owned()),

@@ -62,6 +62,14 @@ await open(['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-
     check(sheets === result.sheets.length, `${sheets} sheets in the scene, ${result.sheets.length} in the result`);
     check(layers.some((l) => l.kind === 'surface'), 'the surface is there');
   }
+  if (Array.isArray(result.lesions) && result.lesions.length > 0) {
+    // Both dates are there and coloured by growth in millimetres; before, both and after are three pictures.
+    for (const shape of ['baseline', 'followup']) {
+      const of = await page.evaluate((s) => window.medialViewer.layers.filter((l) => l.shape === s).map((l) => l.quantity?.unit ?? ''), shape);
+      check(of.length >= result.lesions.length && of.slice(0, result.lesions.length).every((u) => u === 'mm'), `${shape}: ${of.length} surfaces, growth in mm`);
+    }
+    check(await page.locator('.bar').count() === 1, 'one colour bar for the growth');
+  }
   if (pictures) await page.screenshot({ path: picture(''), fullPage: true });
   const stage = page.locator('#stage');
   const pixels = () => page.evaluate(() => {
@@ -82,6 +90,17 @@ await open(['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-
   const first = await pixels();
   check(first.share > 0.05, `the picture is not empty (${(100 * first.share).toFixed(0)} % drawn)`);
 
+  const dates = page.locator('#panel button[data-key="both"]');
+  if (await dates.count()) {
+    const seen = [];
+    for (const key of ['followup', 'both', 'baseline']) {
+      await page.locator(`#panel button[data-key="${key}"]`).evaluate((e) => e.click());
+      seen.push((await pixels()).hash);
+      if (pictures) await stage.screenshot({ path: picture(`-${key}`) });
+    }
+    check(new Set(seen).size === 3, 'before, both and after differ');
+  }
+
   // Every layer switch changes what is shown.
   for (const input of await page.locator('#panel input[data-layer]').all()) {
     const key = await input.getAttribute('data-layer');
@@ -96,6 +115,10 @@ await open(['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-
     check(off !== before || before === 0, `switch ${key}: ${before} -> ${off}`);
     check(await visible() === before, `switch ${key} back`);
   }
+
+  // No cell of a table is left without a value that means something.
+  const cells = await page.evaluate(() => [...document.querySelectorAll('section.card td')].map((e) => e.textContent.trim()));
+  check(cells.length > 10 && !cells.some((c) => /NaN|undefined|Infinity/.test(c)), `${cells.length} cells of tables, none of them NaN`);
 
   // A point of the picture belongs to a layer; what it says is in the layer.
   const picked = await page.evaluate(() => {
@@ -112,6 +135,10 @@ await open(['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-
   }
   const box = await stage.boundingBox();
   await page.mouse.click(box.x + 0.5 * box.width, box.y + 0.5 * box.height);
+  if (await page.evaluate(() => window.medialViewer.picked !== null)) {
+    check(await page.locator('.picked').isVisible(), 'what was picked is named on the picture');
+  }
+  check((await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth)) <= 0, 'nothing runs out of the page sideways');
 
   if (layers.filter((l) => l.kind === 'sheet').length > 1) {
     const counts = await page.evaluate(() => {

@@ -149,15 +149,17 @@ class Viewer {
   }
 
   paintSurface(l) {
-    const painted = Boolean(l.quantity) && this.surfaceColours === l.quantity.name;
+    const ghost = Boolean(this.ghost) && l.shape === this.ghost;
+    const clarity = ghost ? 0.35 : this.clarity;
+    const painted = !ghost && Boolean(l.quantity) && this.surfaceColours === l.quantity.name;
     if (painted) this.paintVertices(l);
     for (const m of l.meshes) {
       m.material.vertexColors = painted;
       m.material.color.copy(painted ? new THREE.Color(0xffffff) : l.colour);
-      setClarity(m.material, this.clarity);
+      setClarity(m.material, clarity);
     }
     // A solid surface needs no second pass for its back.
-    l.meshes[1].visible = this.clarity < 0.985 || this.clipAxis !== 'off';
+    l.meshes[1].visible = clarity < 0.985 || this.clipAxis !== 'off';
   }
 
   paintVertices(l) {
@@ -230,14 +232,34 @@ class Viewer {
       }
     }
     p.append(section('Layers', ...layerRows));
+    if (shapes.includes('baseline') && shapes.includes('followup')) p.append(this.datesSection());
     p.append(this.lookSection());
     const graded = this.layers.filter((l) => Number.isFinite(l.persistence));
     if (graded.length) p.append(this.toleranceSection(graded));
     if (this.settings.T_target_source) p.append(this.motionSection());
     p.append(this.clipSection());
     p.append(this.viewSection());
-    this.info = element('div', { className: 'info' }, 'Click a sheet, a curve, a node or the surface.');
-    p.append(section('Picked', this.info));
+    p.append(element('div', { className: 'hint' }, 'Click the picture: what is there is named in its corner.'));
+    this.info?.remove();
+    this.info = element('div', { className: 'info picked', role: 'status' });
+    this.host.append(this.info);
+  }
+
+  // Before, after, or the follow-up as glass over the baseline.
+  datesSection() {
+    const show = (which) => {
+      this.ghost = which === 'both' ? 'followup' : '';
+      for (const shape of ['baseline', 'followup']) {
+        const on = which === 'both' || which === shape;
+        const key = `surface|${shape}`;
+        if (!this.shown.has(key)) continue;
+        this.shown.set(key, on);
+        const box = this.panel.querySelector(`input[data-layer="${key}"]`);
+        if (box) box.checked = on;
+      }
+      this.apply();
+    };
+    return section('Dates', segmented([['baseline', 'before'], ['both', 'both'], ['followup', 'after']], 'baseline', show).row);
   }
 
   lookSection() {
@@ -494,7 +516,7 @@ class Viewer {
     const hit = inner ?? hits[0];
     this.select(hit ? hit.object.userData.layer : null);
     if (!hit) {
-      this.info.textContent = 'Nothing there.';
+      this.info.replaceChildren();
       this.picked = null;
       return null;
     }
