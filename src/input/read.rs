@@ -14,7 +14,7 @@
 use super::{
     decompress,
     error::{Fault, Flaw, Place, ReadError, quote},
-    formats::{clouds, gifti, medit, metaimage, nifti, nrrd, obj, off, ply, stl, vtk_legacy, vtp},
+    formats::{clouds, dicom_seg, gifti, medit, metaimage, nifti, nrrd, obj, off, ply, stl, vtk_legacy, vtp},
     parsed::{Content, Frame, Parsed, SurfaceBuilder, Units, Volume},
     shape::{Geometry, LabelMap, PointCloud, Provenance, Shape, SourceFormat},
 };
@@ -124,6 +124,7 @@ fn parse(path: &Path, bytes: &[u8], settings: &ReadSettings) -> Result<Parsed, F
         SourceFormat::Nifti => nifti::read(&content, settings.max_voxels),
         SourceFormat::Nrrd => nrrd::read(&content, path, settings.max_voxels),
         SourceFormat::MetaImage => metaimage::read(&content, path, settings.max_voxels),
+        SourceFormat::DicomSeg => dicom_seg::read(&content, settings.max_voxels),
     }?;
     parsed.warnings.extend(warning);
     Ok(parsed)
@@ -160,7 +161,7 @@ fn format_of(path: &Path, head: &[u8]) -> Result<(SourceFormat, Option<String>),
         (None, None) => Err(Flaw::file(
             Fault::UnknownFormat,
             format!("the format is not known; the content begins with {}", quote(head)),
-            "give PLY, STL, OBJ, OFF, XYZ, CSV, VTK, VTP, GIFTI, Medit, NIfTI, NRRD or MetaImage",
+            "give PLY, STL, OBJ, OFF, XYZ, CSV, VTK, VTP, GIFTI, Medit, NIfTI, NRRD, MetaImage or a DICOM segmentation",
         )),
     }
 }
@@ -194,6 +195,7 @@ fn format_of_name(path: &Path) -> Option<SourceFormat> {
         "nii" => SourceFormat::Nifti,
         "nrrd" | "nhdr" => SourceFormat::Nrrd,
         "mha" | "mhd" => SourceFormat::MetaImage,
+        "dcm" => SourceFormat::DicomSeg,
         _ => return None,
     })
 }
@@ -205,7 +207,9 @@ fn format_of_content(head: &[u8]) -> Option<SourceFormat> {
             .windows(text.len())
             .any(|w| w == text)
     };
-    if first_word == b"ply" {
+    if dicom_seg::is_dicom(head) {
+        Some(SourceFormat::DicomSeg)
+    } else if first_word == b"ply" {
         Some(SourceFormat::Ply)
     } else if stl::is_binary(head) || first_word == b"solid" {
         Some(SourceFormat::Stl)
@@ -245,6 +249,7 @@ fn title(format: SourceFormat) -> &'static str {
         SourceFormat::Nifti => "NIfTI",
         SourceFormat::Nrrd => "NRRD",
         SourceFormat::MetaImage => "MetaImage",
+        SourceFormat::DicomSeg => "DICOM",
         SourceFormat::Generated => "generated",
     }
 }
@@ -264,6 +269,7 @@ fn extension(format: SourceFormat) -> &'static str {
         SourceFormat::Nifti => "nii",
         SourceFormat::Nrrd => "nrrd",
         SourceFormat::MetaImage => "mha",
+        SourceFormat::DicomSeg => "dcm",
     }
 }
 

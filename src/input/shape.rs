@@ -131,6 +131,7 @@ pub enum SourceFormat {
     Nifti,
     Nrrd,
     MetaImage,
+    DicomSeg,
     /// Made in memory, not read.
     Generated,
 }

@@ -300,6 +300,16 @@ pub struct Report {
     pub run: Value,
 }
 
+/// A colour bar.
+#[derive(Clone, Debug, Serialize)]
+struct Legend {
+    name: String,
+    unit: String,
+    /// Stops of a CSS gradient.
+    gradient: String,
+    ticks: [String; 3],
+}
+
 /// Pixels of the still picture.
 const STILL_SIZE: [usize; 2] = [1200, 760];
 
@@ -349,6 +359,7 @@ impl Report {
             sections => minijinja::value::Serde(&self.sections),
             still => still,
             still_alt => self.still_text(),
+            legends => minijinja::value::Serde(self.still_legends()),
             glb => glb,
             view => script_json(&self.view_settings(&view))?,
             viewer => VIEWER,
@@ -369,6 +380,35 @@ impl Report {
                 "blue-white-red": ColourScale::BlueWhiteRed.stops(),
             },
         })
+    }
+
+    /// The colour bars of the still picture: of every quantity that a visible surface is painted with.
+    fn still_legends(&self) -> Vec<Legend> {
+        let mut out: Vec<Legend> = Vec::new();
+        let shown = self
+            .scene
+            .layers
+            .iter()
+            .filter(|l| l.visible && l.kind == LayerKind::Surface);
+        for q in shown.filter_map(|l| l.quantity.as_ref()) {
+            if self.surface_colours.as_ref() != Some(&q.name) || out.iter().any(|l| l.name == q.name) {
+                continue;
+            }
+            let stops: Vec<String> = q
+                .scale
+                .stops()
+                .iter()
+                .map(|[r, g, b]| format!("rgb({r},{g},{b})"))
+                .collect();
+            let [lo, hi] = q.range;
+            out.push(Legend {
+                name: q.name.clone(),
+                unit: q.unit.clone(),
+                gradient: stops.join(","),
+                ticks: [lo, 0.5 * (lo + hi), hi].map(pretty),
+            });
+        }
+        out
     }
 
     /// What the still picture shows, in words.

@@ -196,7 +196,10 @@ pub fn render(scene: &Scene, view: &View, width: usize, height: usize) -> Image 
     };
     let hides_something = visible().any(|l| l.kind != LayerKind::Surface);
     let surfaces = visible().filter(|l| l.kind == LayerKind::Surface).count();
-    let is_glass = |l: &Layer| l.kind == LayerKind::Surface && (hides_something || surfaces > 1);
+    // Painted surfaces stay solid side by side: a colour on glass cannot be read.
+    let is_glass = |l: &Layer| {
+        l.kind == LayerKind::Surface && (hides_something || (surfaces > 1 && l.quantity.is_none()))
+    };
     for layer in visible().filter(|l| !is_glass(l)) {
         draw(&mut frame, &projection, layer, false);
     }

@@ -68,7 +68,7 @@ await open(['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-
       const of = await page.evaluate((s) => window.medialViewer.layers.filter((l) => l.shape === s).map((l) => l.quantity?.unit ?? ''), shape);
       check(of.length >= result.lesions.length && of.slice(0, result.lesions.length).every((u) => u === 'mm'), `${shape}: ${of.length} surfaces, growth in mm`);
     }
-    check(await page.locator('.bar').count() === 1, 'one colour bar for the growth');
+    check(await page.locator('#stage .bar').count() === 1, 'one colour bar for the growth');
   }
   if (pictures) await page.screenshot({ path: picture(''), fullPage: true });
   const stage = page.locator('#stage');
@@ -162,7 +162,7 @@ await open(['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-
       for (const v of values) {
         await select.selectOption(v);
         if (v === 'radius' || (label === 'Surface by' && v)) {
-          check(await page.locator('.bar').count() > 0, `${label} ${v}: a colour bar is shown`);
+          check(await page.locator('#stage .bar').count() > 0, `${label} ${v}: a colour bar is shown`);
           if (pictures) await stage.screenshot({ path: picture(`-${v}`) });
         }
       }
@@ -184,6 +184,9 @@ await open(['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-
   await page.emulateMedia({ media: 'print' });
   check(await page.locator('#still img').isVisible(), 'print shows the still picture');
   check(!(await stage.isVisible()), 'print hides the viewer');
+  if (Array.isArray(result.lesions) && result.lesions.length > 0) {
+    check(await page.locator('#still .bar').isVisible(), 'the printed picture has its colour bar');
+  }
   if (pictures) await page.screenshot({ path: picture('-print'), fullPage: true });
 });
 

@@ -393,9 +393,13 @@ class Viewer {
   }
 
   look(toward, up) {
-    const box = new THREE.Box3();
-    for (const l of this.layers) if (l.object.visible) box.expandByObject(l.object);
-    if (box.isEmpty()) box.copy(this.box);
+    const seen = new THREE.Box3();
+    for (const l of this.layers) if (l.object.visible) seen.expandByObject(l.object);
+    if (seen.isEmpty()) seen.copy(this.box);
+    // Both dates fit in the picture, whichever is shown, so that turning from one to the other moves nothing.
+    const framed = this.layers.filter((x) => x.object.visible || x.shape === 'followup');
+    const box = seen.clone();
+    for (const l of framed) box.expandByObject(l.object);
     const centre = box.getCenter(new THREE.Vector3());
     const aspect = this.camera.aspect || 1;
     const half = Math.tan(THREE.MathUtils.degToRad(0.5 * this.camera.fov));
@@ -404,7 +408,7 @@ class Viewer {
     const realUp = new THREE.Vector3().crossVectors(toward, right).normalize();
     const p = new THREE.Vector3();
     let distance = 0;
-    for (const l of this.layers.filter((x) => x.object.visible)) {
+    for (const l of framed) {
       const position = l.geometry.getAttribute('position');
       const stride = Math.max(1, Math.floor(position.count / 5000));
       for (let i = 0; i < position.count; i += stride) {
@@ -427,7 +431,7 @@ class Viewer {
     this.controls.zoomSpeed = 0.8;
     this.controls.addEventListener('change', () => this.draw());
     this.controls.update();
-    const s = box.getSize(new THREE.Vector3());
+    const s = seen.getSize(new THREE.Vector3());
     this.size.textContent = `${number(s.x)} × ${number(s.y)} × ${number(s.z)} mm (right-left × front-back × foot-head)`;
     this.draw();
   }

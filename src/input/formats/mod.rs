@@ -7,6 +7,7 @@
 //! read a file.
 
 pub(super) mod clouds;
+pub(super) mod dicom_seg;
 pub(super) mod gifti;
 pub(super) mod medit;
 pub(super) mod metaimage;
