@@ -59,9 +59,11 @@ fn dates_are_aligned_on_the_label_of_a_bone() {
     let found = json(&out);
     let lesions = found["lesions"].as_array().expect("lesions");
     assert_eq!(lesions.len(), 1, "the bone is no lesion");
-    let percent = lesions[0]["change"]["percent"].as_f64().expect("a number");
+    // A ball of 4 voxels radius is counted to some percent: the interval says so and holds the truth.
+    let interval = &lesions[0]["change"]["ci95_percent"];
     let truth = 100.0 * (ball_volume(5.0) / ball_volume(4.0) - 1.0);
-    assert!((percent - truth).abs() < 12.0, "{percent} for {truth}");
+    let end = |k: usize| interval[k].as_f64().expect("a number");
+    assert!(end(0) < truth && truth < end(1), "{interval} for {truth}");
     let alignment = &found["alignment"];
     assert_eq!(alignment["on"], "label 5");
     let rows: [[f64; 4]; 4] =
@@ -117,7 +119,7 @@ fn segmentations_are_compared_with_the_truth_and_give_the_interval_their_spread(
     for pair in s["pairs"].as_array().expect("pairs") {
         assert_eq!(pair["first"], "truth");
         let a = &pair["agreement"];
-        assert!(a["dice"].as_f64().expect("Dice") > 0.95);
+        assert!(a["dice"].as_f64().expect("Dice") > 0.93);
         assert!(
             (a["mesh"]["assd"].as_f64().expect("a distance") - 0.2).abs() < 0.12,
             "{a}"
