@@ -29,6 +29,9 @@ struct Pair {
     corresponds: bool,
 }
 
+/// Reads or makes the pairs of a set.
+type Make = fn(&Path) -> Vec<Pair>;
+
 fn main() {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let most = args.iter().find_map(|a| a.parse().ok()).unwrap_or(usize::MAX);
@@ -38,7 +41,7 @@ fn main() {
         "| set | pairs | rms > 1.05 peer | worst ratio | median rms % diag | three answers agree | right | right, ambiguous | wrong, ambiguous | median s |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|");
-    let sets: [(&str, fn(&Path) -> Vec<Pair>); 4] = [
+    let sets: [(&str, Make); 4] = [
         ("wrists", wrists),
         ("sides", sides),
         ("knees", knees),
