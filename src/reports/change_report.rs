@@ -155,10 +155,12 @@ pub fn change_report(title: &str, change: &Value, run: &Value, scene: Scene) -> 
         ..Report::default()
     };
     figures(&mut report, change);
-    report.note(
+    if !items(change, "lesions").is_empty() {
+        report.note(
         NoteLevel::Info,
         "Response categories are research calculations from one pair of segmentations; they do not replace a reading by the criteria's own rules.",
     );
+    }
     for w in items(run, "warnings")
         .iter()
         .chain(items(change, "warnings"))
