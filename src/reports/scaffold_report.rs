@@ -25,7 +25,7 @@ pub fn scaffold_report(
         title: title.to_owned(),
         subtitle: subtitle(scaffold),
         scene,
-        tolerance_mm: Some(tolerance),
+        tolerance_mm: Some(least_shown(scaffold, tolerance)),
         result: scaffold.clone(),
         run: run.clone(),
         ..Report::default()
@@ -39,6 +39,13 @@ pub fn scaffold_report(
     report.section(checks(scaffold));
     report.section(run_section(run));
     Ok(report)
+}
+
+/// Where the slider and the plot begin: the least persistence that is listed, so that the picture opens with all that the tables name.
+fn least_shown(scaffold: &Value, tolerance: f64) -> f64 {
+    let sheets = persistences(scaffold, "sheets", &[]);
+    let curves = persistences(scaffold, "curves", &["axial", "wire"]);
+    sheets.into_iter().chain(curves).fold(tolerance, f64::min)
 }
 
 fn subtitle(scaffold: &Value) -> String {
@@ -157,7 +164,7 @@ fn simplification(s: &Value, tolerance: f64) -> Section {
          A long flat step is a stable level of detail; the slider beside the picture hides what lies below a level."
             .to_owned(),
     );
-    let from = tolerance.min(sheets.iter().chain(&axial).copied().fold(f64::INFINITY, f64::min));
+    let from = least_shown(s, tolerance);
     let mut series = Vec::new();
     if !sheets.is_empty() {
         series.push(survivors("sheets", "#3a86c8", &mut sheets, from));
