@@ -29,10 +29,13 @@ fn student_95(degrees_of_freedom: usize) -> f64 {
     match degrees_of_freedom {
         0 => f64::INFINITY,
         n @ 1..=10 => EXACT[n - 1],
-        // Cornish and Fisher's expansion to the second order; right to four digits from here on.
+        // Cornish and Fisher's expansion to the third order; right to 2e-4 from here on.
         n => {
             let (z, n) = (NORMAL_95, n as f64);
-            z + (z.powi(3) + z) / (4.0 * n) + (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / (96.0 * n * n)
+            let first = z.powi(3) + z;
+            let second = 5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z;
+            let third = 3.0 * z.powi(7) + 19.0 * z.powi(5) + 17.0 * z.powi(3) - 15.0 * z;
+            z + first / (4.0 * n) + second / (96.0 * n * n) + third / (384.0 * n.powi(3))
         }
     }
 }
