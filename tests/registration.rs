@@ -171,22 +171,29 @@ fn a_mirrored_shape_is_found_to_be_mirrored_and_an_unmirrored_one_is_not() {
 #[test]
 fn a_scaled_shape_needs_the_similarity() {
     let target = lump(1.0);
-    let motion = motion(5);
-    let scaled = Rigid {
-        linear: motion.linear * 1.1,
-        translation: motion.translation,
-    };
-    let source = moved(&target, &scaled);
     let settings = |scale| RegistrationSettings {
         scale,
         ..Default::default()
     };
-    let similar = fit(&target, &source, &settings(true));
-    assert!((similar.scale - 1.0 / 1.1).abs() < 1e-5, "{}", similar.scale);
-    assert!(similar.rms < 1e-4, "{}", similar.rms);
-    let rigid = fit(&target, &source, &settings(false));
-    assert!((rigid.scale - 1.0).abs() < 1e-9);
-    assert!(rigid.rms > 0.3);
+    // A size off by a quarter: without it in the search, upside down fits as well.
+    for (seed, factor) in [(5, 1.1), (6, 0.8), (7, 1.25), (8, 0.8), (9, 1.25)] {
+        let motion = motion(seed);
+        let scaled = Rigid {
+            linear: motion.linear * factor,
+            translation: motion.translation,
+        };
+        let source = moved(&target, &scaled);
+        let similar = fit(&target, &source, &settings(true));
+        assert!(
+            (similar.scale - 1.0 / factor).abs() < 1e-5,
+            "{factor}: {}",
+            similar.scale
+        );
+        assert!(similar.rms < 1e-4, "{factor}: {}", similar.rms);
+        let rigid = fit(&target, &source, &settings(false));
+        assert!((rigid.scale - 1.0).abs() < 1e-9);
+        assert!(rigid.rms > 0.3);
+    }
 }
 
 #[test]

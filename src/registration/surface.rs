@@ -95,6 +95,12 @@ pub(crate) fn whole(
 ) -> Vec<WholeFit> {
     let mut poses = guesses.to_vec();
     poses.extend(from_moments(&target.moments, &source.moments));
+    if scale {
+        // At the wrong size every basin of the search is wrong: a shape 20 % smaller fits inside the other upside down as well.
+        for pose in &mut poses {
+            *pose = sized(source, target, pose);
+        }
+    }
     let rough = Level {
         iterations: 12,
         from: 0.5,
@@ -103,7 +109,7 @@ pub(crate) fn whole(
         exact: false,
         cosine: 0.0,
     };
-    let poses = search(source, target, poses, rough, 8);
+    let poses = search(source, target, poses, rough, 8, scale);
     let fine = Level {
         iterations: 12,
         from: 0.25,
@@ -112,7 +118,7 @@ pub(crate) fn whole(
         exact: false,
         cosine: 0.3,
     };
-    let poses = search(source, target, poses, fine, keep.max(2));
+    let poses = search(source, target, poses, fine, keep.max(2), scale);
     let mut fits: Vec<WholeFit> = poses
         .into_iter()
         .map(|pose| settle(source, target, pose, 500, 12, scale))
@@ -131,11 +137,28 @@ pub(crate) fn whole(
     fits
 }
 
-fn search(source: &View, target: &View, poses: Vec<Rigid>, level: Level, keep: usize) -> Vec<Rigid> {
+/// A pose with the source brought to the target's size about its own centroid; whole shapes have comparable radii of gyration.
+fn sized(source: &View, target: &View, pose: &Rigid) -> Rigid {
+    let centre = source.moments.centroid;
+    let linear = pose.linear * (target.gyration() / source.gyration());
+    Rigid {
+        linear,
+        translation: pose.apply(centre) - linear * centre,
+    }
+}
+
+fn search(
+    source: &View,
+    target: &View,
+    poses: Vec<Rigid>,
+    level: Level,
+    keep: usize,
+    scale: bool,
+) -> Vec<Rigid> {
     let mut fits: Vec<WholeFit> = poses
         .into_par_iter()
         .map(|pose| {
-            let pose = refine(source, target, pose, level, false);
+            let pose = refine(source, target, pose, level, scale);
             WholeFit {
                 pose,
                 rms: table_rms(source, target, &pose, 300),
@@ -179,7 +202,9 @@ fn table_rms(source: &View, target: &View, pose: &Rigid, count: usize) -> f64 {
             .sum();
         sum / n as f64
     };
-    (0.5 * (one(source, target, pose) + one(target, source, &pose.inverse()))).sqrt()
+    // Both in the target's frame, as in [`Distances`].
+    let scale = pose.linear.determinant().abs().cbrt();
+    (0.5 * (one(source, target, pose) + one(target, source, &pose.inverse()) * scale * scale)).sqrt()
 }
 
 /// The untruncated exact fit from a near pose; the best pose on the way by symmetric distance.
