@@ -9,7 +9,7 @@
 //!   ([`gap_transforms`]), is closed ([`closure`]: [`diffusion`], [`labelling`] with [`min_cut`], [`islands`],
 //!   [`star_repair`], [`adopt`], [`handles`]), judged open or closed ([`openness`]), oriented ([`orient`]), reported
 //!   ([`report`]) and looked over for faults ([`self_check`]).
-//! * [`mesh_repair`]: a damaged mesh keeps its good triangles; the rest is found anew from its points. [`mend`] closes holes.
+//! * [`mesh_repair`]: a damaged mesh keeps its good triangles; the rest is found anew from its points. [`mend()`] closes holes.
 
 pub mod adopt;
 pub mod balls;
