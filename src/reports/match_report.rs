@@ -227,8 +227,15 @@ fn correspondences(r: &Value) -> Section {
         ("unmatched_target", "Only in the target"),
         ("unmatched_source", "Only in the source"),
     ] {
-        if let Some(value) = at(r, &format!("correspondences.{key}")) {
-            section.paragraphs.push(format!("{word}: {}.", text(value)));
+        let named: Vec<String> = ["nodes", "curves", "sheets"]
+            .into_iter()
+            .filter_map(|kind| {
+                let ids = at(r, &format!("correspondences.{key}.{kind}")).map(text)?;
+                (!ids.is_empty()).then(|| format!("{kind} {ids}"))
+            })
+            .collect();
+        if !named.is_empty() {
+            section.paragraphs.push(format!("{word}: {}.", named.join("; ")));
         }
     }
     section
