@@ -1,34 +1,19 @@
 //! Criterion bench of the coarse scaffold of a box at three densities: `cargo bench --bench coarse_scaffold`.
 
+mod support;
+
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use datasets_synthetic::shapes;
 use medial_scaffold::coarse_scaffold::{CoarseScaffoldSettings, coarse_scaffold};
-use medial_scaffold::fine_scaffold::{FineScaffoldSettings, fine_scaffold};
-use medial_scaffold::geometry::TriangleMesh;
 use medial_scaffold::regularise::{RegulariseSettings, regularise};
-use medial_scaffold::segregation::{KnownSurfaceSettings, segregate_known_refined};
+use support::{SIZES, inside, segregated_box};
 
 fn bench(c: &mut Criterion) {
     let mut group = c.benchmark_group("coarse_scaffold");
     group.sample_size(10);
-    let shape = shapes::box_shape(1.0, 1.4, 2.0);
-    let mesh = shape.mesh(20_000);
-    let surface = TriangleMesh {
-        points: mesh.points,
-        triangles: mesh.triangles,
-    };
-    for n in [5_000usize, 20_000, 80_000] {
-        let points = shape.sample_poisson(n, 1).points;
-        let refined = segregate_known_refined(&points, &surface, &KnownSurfaceSettings::default())
-            .expect("a closed surface");
+    for n in SIZES {
+        let fine = inside(&segregated_box(n));
+        let regularised = regularise(&fine, &RegulariseSettings::default()).expect("topology is kept");
         group.bench_with_input(BenchmarkId::new("box", n), &n, |b, _| {
-            let fine = fine_scaffold(
-                &refined.triangulation,
-                &refined.result.segregation,
-                &FineScaffoldSettings::default(),
-            )
-            .expect("an inside");
-            let regularised = regularise(&fine, &RegulariseSettings::default()).expect("topology is kept");
             b.iter(|| coarse_scaffold(&fine, &regularised, &CoarseScaffoldSettings::default()));
         });
     }
