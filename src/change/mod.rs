@@ -60,7 +60,7 @@ pub enum ChangeError {
     /// A mesh that does not enclose a volume.
     #[error(
         "{name}: the mesh does not enclose a volume ({boundary_edges} open edges, {nonmanifold_edges} edges with more than two \
-         triangles, {}); close it first (`medial mesh` on its vertices does)",
+         triangles, {}); close it first (--repair does, and lists what it changed)",
         if *.oriented { "consistently oriented" } else { "triangles turned both ways" }
     )]
     OpenMesh {

@@ -172,8 +172,46 @@ impl Mask {
         (moved.abs() <= 0.5 * self.voxel_volume_mm3().cbrt()).then_some(mesh)
     }
 
+    /// The smooth surface at the widest of three kernels that keeps every part of the lesion; a thin lobe that the kernel wipes out
+    /// would be shown as a change though both masks have it.
+    fn surface_of_every_part(&self, sigma_vox: f64) -> Option<TriangleMesh> {
+        [1.0, 0.75, 0.5]
+            .into_iter()
+            .map(|share| share * sigma_vox)
+            .find(|&sigma| self.keeps_every_part(sigma))
+            .and_then(|sigma| self.smooth_surface(sigma))
+    }
+
+    /// Whether every voxel has one within [`LOST_VOX`] that is inside the blurred surface.
+    fn keeps_every_part(&self, sigma_vox: f64) -> bool {
+        let (field, pad) = self.blurred(sigma_vox);
+        let [nx, ny, _] = field.dims;
+        let inside = |[i, j, k]: [usize; 3]| field.values[i + nx * (j + ny * k)] >= 0.5;
+        let reach = || 0..=2 * LOST_VOX;
+        self.voxels().all(|v| {
+            let v = v.map(|x| x + pad);
+            inside(v)
+                || reach().any(|k| {
+                    reach().any(|j| {
+                        reach()
+                            .any(|i| inside([v[0] + i - LOST_VOX, v[1] + j - LOST_VOX, v[2] + k - LOST_VOX]))
+                    })
+                })
+        })
+    }
+
     fn blurred_surface(&self, sigma_vox: f64) -> TriangleMesh {
-        let pad = (4.0 * sigma_vox).ceil() as usize + 1;
+        let (field, pad) = self.blurred(sigma_vox);
+        let mut mesh = marching_cubes(&field);
+        for p in &mut mesh.points {
+            *p -= DVec3::splat(pad as f64);
+        }
+        self.to_world(mesh)
+    }
+
+    /// The blurred mask, and how many voxels wider its grid is on each side.
+    fn blurred(&self, sigma_vox: f64) -> (Field, usize) {
+        let pad = ((4.0 * sigma_vox).ceil() as usize + 1).max(LOST_VOX);
         let [nx, ny, _] = self.dims;
         let dims = self.dims.map(|n| n + 2 * pad);
         let mut values = vec![0f32; dims.iter().product()];
@@ -182,13 +220,12 @@ impl Mask {
             values[i + dims[0] * (j + dims[1] * k)] = 1.0;
         }
         let values = gaussian(&values, dims, sigma_vox);
-        let mut mesh = marching_cubes(&Field { dims, values });
-        for p in &mut mesh.points {
-            *p -= DVec3::splat(pad as f64);
-        }
-        self.to_world(mesh)
+        (Field { dims, values }, pad)
     }
 }
+
+/// A part is lost when its voxels lie farther than this from the blurred surface's inside, along an axis: tips are rounded by less.
+const LOST_VOX: usize = 2;
 
 /// Separable Gaussian filter; values beyond the grid are 0.
 fn gaussian(values: &[f32], dims: [usize; 3], sigma_vox: f64) -> Vec<f32> {
@@ -247,7 +284,7 @@ pub struct Region {
 impl Region {
     fn from_mask(label: i32, mask: Mask, settings: &ChangeSettings) -> Region {
         let plain = mask.plain_surface();
-        let (surface, surface_kind) = match mask.smooth_surface(settings.smoothing_vox) {
+        let (surface, surface_kind) = match mask.surface_of_every_part(settings.smoothing_vox) {
             Some(smooth) => (smooth, SurfaceKind::Smooth),
             None => (plain.clone(), SurfaceKind::Plain),
         };
@@ -399,4 +436,38 @@ fn components(map: &LabelMap, keep: impl Fn(i32) -> bool) -> Vec<u32> {
         }
     }
     ids
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DMat3;
+
+    /// A lobe two voxels across on a ball is wiped out by the wide kernel; the surface must still show it.
+    #[test]
+    fn a_thin_lobe_is_not_lost_to_smoothing() {
+        let dims = [24, 24, 40];
+        let mut values = vec![false; dims.iter().product()];
+        for k in 0..dims[2] {
+            for j in 0..dims[1] {
+                for i in 0..dims[0] {
+                    let ball = DVec3::new(i as f64, j as f64, k as f64).distance(DVec3::splat(11.5)) < 9.0;
+                    let lobe = (11..13).contains(&i) && (11..13).contains(&j) && (12..32).contains(&k);
+                    values[i + dims[0] * (j + dims[1] * k)] = ball || lobe;
+                }
+            }
+        }
+        let mask = Mask {
+            dims,
+            values,
+            spacing_mm: DVec3::ONE,
+            origin: DVec3::ZERO,
+            direction: DMat3::IDENTITY,
+        };
+        let top = |mesh: &TriangleMesh| mesh.points.iter().map(|p| p.z).fold(f64::MIN, f64::max);
+        let wide = mask.smooth_surface(1.2).expect("the ball is large");
+        assert!(top(&wide) < 26.0, "{}", top(&wide));
+        let region = Region::from_mask(1, mask, &ChangeSettings::default());
+        assert!(top(&region.surface) > 29.0, "{}", top(&region.surface));
+    }
 }

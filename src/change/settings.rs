@@ -36,6 +36,7 @@ pub struct ChangeSettings {
     pub surface_dice_tolerance_mm: f64,
     /// Standard deviation of the smoothing kernel that turns a mask into a smooth surface, voxels along each axis. At 1.2
     /// the steps of slices vanish but for flat ends, and structures of three voxels stay.
+    /// Where this wipes out a part of the lesion, three quarters or a half of it is taken.
     pub smoothing_vox: f64,
     /// A patch of the surface counts as changed when it somewhere moved by more than this many standard deviations of the
     /// difference of two boundaries; it reaches as far as half of that. Each boundary is known to a voxel along its normal, so two
