@@ -15,7 +15,8 @@
 use super::balls::Balls;
 use super::closure::{Closure, ClosureSettings, close, close_without_off, preset_facets};
 use super::error::SegregationError;
-use super::gap_transforms::{CostRule, gap_transforms};
+use super::gap_cost::CostRule;
+use super::gap_transforms::gap_transforms;
 use super::labels::{Segregation, boundary_triangles};
 use super::openness::{area_share, patches, rims, unsupported};
 use super::orient::orient;

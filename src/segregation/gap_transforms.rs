@@ -2,58 +2,35 @@
 //!
 //! In: triangulation, circumspheres, local spacing. Out: which facets were accepted, as a set of triangles that is a manifold
 //! with border wherever the points allow one. A gap transform removes a curve of the full scaffold and inserts its dual
-//! triangle (Leymarie & Kimia 2007; Chang, Leymarie & Kimia 2009).
+//! triangle (Leymarie & Kimia 2007; Chang, Leymarie & Kimia 2009). What one costs is in [`super::gap_cost`].
 //!
-//! 1. *Cost* of a facet with vertices at distances within a few spacings: `perimeter / (R c^2)`, `c` its compactness (1 when
-//!    equilateral), `R` the shorter of the two parts of its dual curve measured from the facet; small for a triangle whose
-//!    curve runs far to both sides, as that of a surface triangle does.
-//! 2. *Pass 1*, cheapest first, takes facets whose curve starts on the facet (its smallest sphere is empty). *Pass 2* takes
-//!    the others round open edges and unused points, with half the spacing in place of `R`.
-//! 3. *Continuity*: an accepted triangle makes flat continuations across its edges cheaper and folds dearer by
-//!    `((exp theta - 1)^2 - 1) |e| / (R c^2)`. The parts of a cost are kept apart by edge and added anew, so undoing a
-//!    triangle restores every cost exactly.
-//! 4. *Topology*: an edge has at most two triangles (a dearer one gives way, at most five times each); a point with a closed
+//! 1. *Pass 1*, cheapest first, takes facets whose curve starts on the facet (its smallest sphere is empty). *Pass 2* takes
+//!    the others round open edges and unused points, with half the spacing in place of the curve's length.
+//! 2. *Continuity*: an accepted triangle changes the cost of its neighbours. The parts of a cost are kept apart by edge and
+//!    added anew, so undoing a triangle restores every cost exactly.
+//! 3. *Topology*: an edge has at most two triangles (a dearer one gives way, at most five times each); a point with a closed
 //!    ring takes no more; a triangle that would touch the surface in a point only waits, five times at most.
-//! 5. Between the passes triangles that hang on one edge or none are undone.
+//! 4. Between the passes triangles that hang on one edge or none are undone.
 //!
-//! Departures: the local spacing replaces the median over all Voronoi facets, so that uneven clouds stay whole
-//! ([`CostRule::Authors`] keeps the published rule); the queue is ordered by (cost, facet), a total order, so the result
-//! does not depend on insertion order. Cost: `O(n log n)`; each triangle is undone a bounded number of times.
+//! Departure: the queue is ordered by (cost, facet), a total order, so the result does not depend on insertion order.
+//! Cost: `O(n log n)`; each triangle is undone a bounded number of times.
 
 use super::balls::Balls;
 use super::diffusion::slot;
 use super::facets::FacetDepths;
+use super::gap_cost::{Candidate, CostModel, CostRule, State};
 use super::stars::{StarBuffer, Stars};
-use crate::delaunay::{Facet, INFINITE, Triangulation};
+use crate::delaunay::{Facet, Triangulation};
 use crate::geometry::{TetId, VertexId};
-use glam::DVec3;
 use ordered_float::OrderedFloat;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// Which lengths the cost is measured against.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum CostRule {
-    /// Half the local spacing, and edges of at most five local spacings.
-    #[default]
-    Local,
-    /// The authors': the median of half the length of all Delaunay edges, and edges of at most six times that.
-    Authors,
-}
-
-/// Longest edge over the local spacing.
-const LOCAL_REACH: f64 = 5.0;
-/// Longest edge over the median half edge, authors' rule.
-const AUTHORS_REACH: f64 = 6.0;
 /// Times a triangle may be undone.
 const MOST_UNDONE: u8 = 5;
 /// Times a triangle that touches in a point may wait.
 const MOST_DELAYS: u8 = 5;
-/// Factor on the cost of a triangle that waits.
-const DELAY: f64 = 1.2;
 
 /// The accepted facets.
 #[derive(Clone, Debug, Default)]
@@ -83,52 +60,13 @@ pub fn gap_transforms(
     greedy.finish()
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum State {
-    /// Has an entry in the queue (or had one and may get another).
-    Waiting,
-    Accepted,
-    Refused,
-}
-
-#[derive(Clone, Debug)]
-struct Candidate {
-    facet: Facet,
-    vertices: [VertexId; 3],
-    /// Cost without continuity.
-    base: f64,
-    /// `R c^2` of the current pass.
-    divisor: f64,
-    /// Continuity by edge (edge `k` is opposite vertex `k`).
-    continuity: [f64; 3],
-    state: State,
-    preset: bool,
-    undone: u8,
-    delays: u8,
-}
-
-impl Candidate {
-    fn cost(&self) -> f64 {
-        let sum = self.base + (self.continuity[0] + self.continuity[1] + self.continuity[2]);
-        sum.max(0.0) * DELAY.powi(i32::from(self.delays)) + 0.0
-    }
-
-    fn edge(&self, k: usize) -> [VertexId; 2] {
-        [self.vertices[(k + 1) % 3], self.vertices[(k + 2) % 3]]
-    }
-}
-
 /// Queue key: cheapest first, then the facet.
 type Key = Reverse<(OrderedFloat<f64>, u32)>;
 
 struct Greedy<'a> {
     triangulation: &'a Triangulation,
-    balls: &'a Balls,
     depths: &'a FacetDepths,
-    spacing_mm: &'a [f64],
-    rule: CostRule,
-    /// Median half Delaunay edge, authors' rule only, mm.
-    median_half_edge: f64,
+    costs: CostModel<'a>,
     second: bool,
     /// Candidate of each facet by the slot of its smaller side.
     candidate_of: Vec<u32>,
@@ -149,17 +87,10 @@ impl<'a> Greedy<'a> {
         spacing_mm: &'a [f64],
         rule: CostRule,
     ) -> Self {
-        let median_half_edge = match rule {
-            CostRule::Local => 0.0,
-            CostRule::Authors => median_half_edge(triangulation),
-        };
         Self {
             triangulation,
-            balls,
             depths,
-            spacing_mm,
-            rule,
-            median_half_edge,
+            costs: CostModel::new(triangulation, balls, depths, spacing_mm, rule),
             second: false,
             candidate_of: vec![NONE; 4 * triangulation.num_tets()],
             candidates: Vec::new(),
@@ -167,68 +98,6 @@ impl<'a> Greedy<'a> {
             queue: BinaryHeap::new(),
             undone: 0,
         }
-    }
-
-    fn position(&self, v: VertexId) -> DVec3 {
-        self.triangulation.points[v.index()]
-    }
-
-    /// Half the spacing at a triangle (or its authors' stand-in), mm.
-    fn half_spacing(&self, vertices: [VertexId; 3]) -> f64 {
-        match self.rule {
-            CostRule::Local => vertices.iter().map(|v| self.spacing_mm[v.index()]).sum::<f64>() / 6.0,
-            CostRule::Authors => self.median_half_edge,
-        }
-    }
-
-    /// The candidate of a facet, without continuity; `None` when it is infinite, oversized or has no area.
-    fn candidate(&self, facet: Facet, second: bool) -> Option<Candidate> {
-        let vertices = self.triangulation.facet_vertices(facet);
-        if vertices.contains(&INFINITE) {
-            return None;
-        }
-        let [a, b, c] = vertices.map(|v| self.position(v));
-        let sides = [(c - b).length(), (a - c).length(), (b - a).length()];
-        let longest = sides[0].max(sides[1]).max(sides[2]);
-        let half = self.half_spacing(vertices);
-        let reach = match self.rule {
-            CostRule::Local => 2.0 * LOCAL_REACH * half,
-            CostRule::Authors => AUTHORS_REACH * half,
-        };
-        if longest > reach {
-            return None;
-        }
-        let area = 0.5 * (b - a).cross(c - a).length();
-        let squares: f64 = sides.iter().map(|s| s * s).sum();
-        let compactness = 4.0 * 3f64.sqrt() * area / squares;
-        if compactness <= 1e-6 {
-            return None;
-        }
-        let reach_mm = if second { half } else { self.shorter_curve(facet) };
-        let divisor = (reach_mm * compactness * compactness).max(f64::MIN_POSITIVE);
-        Some(Candidate {
-            facet,
-            vertices,
-            base: sides.iter().sum::<f64>() / divisor,
-            divisor,
-            continuity: [0.0; 3],
-            state: State::Waiting,
-            preset: false,
-            undone: 0,
-            delays: 0,
-        })
-    }
-
-    /// The shorter part of the dual curve, measured from the facet, mm.
-    fn shorter_curve(&self, facet: Facet) -> f64 {
-        let part = |f: Facet| {
-            if self.triangulation.is_finite(f.tet) && !self.balls.flat[f.tet.index()] {
-                f64::from(self.depths.depth(f)).abs() * self.balls.radii[f.tet.index()]
-            } else {
-                f64::INFINITY
-            }
-        };
-        part(facet).min(part(self.triangulation.mirror(facet)))
     }
 
     fn canonical(&self, facet: Facet) -> Facet {
@@ -242,7 +111,7 @@ impl<'a> Greedy<'a> {
         if known != NONE {
             return Some(known);
         }
-        let candidate = self.candidate(facet, self.second)?;
+        let candidate = self.costs.candidate(facet, self.second)?;
         Some(self.insert(candidate))
     }
 
@@ -265,17 +134,7 @@ impl<'a> Greedy<'a> {
             if self.candidate_of[slot(facet)] != NONE {
                 continue;
             }
-            let index = self.insert(Candidate {
-                facet,
-                vertices: self.triangulation.facet_vertices(facet),
-                base: 0.0,
-                divisor: 1.0,
-                continuity: [0.0; 3],
-                state: State::Waiting,
-                preset: true,
-                undone: 0,
-                delays: 0,
-            });
+            let index = self.insert(self.costs.preset(facet));
             self.accept(index);
         }
     }
@@ -290,7 +149,7 @@ impl<'a> Greedy<'a> {
                     .filter(|&f| {
                         f < self.triangulation.mirror(f) && self.depths.is_gabriel(self.triangulation, f)
                     })
-                    .filter_map(|f| self.candidate(f, false))
+                    .filter_map(|f| self.costs.candidate(f, false))
                     .collect()
             })
             .collect();
@@ -316,6 +175,7 @@ impl<'a> Greedy<'a> {
                 continue;
             }
             let fresh = self
+                .costs
                 .candidate(old.facet, true)
                 .expect("it was a candidate before");
             let old = &mut self.candidates[index];
@@ -340,11 +200,9 @@ impl<'a> Greedy<'a> {
     /// Queues the candidates round the open edges of an accepted triangle.
     fn offer_round(&mut self, index: u32) {
         for k in 0..3 {
-            let [a, b] = self.candidates[index as usize].edge(k);
-            let third = self.candidates[index as usize].vertices[k];
-            let facet = self.candidates[index as usize].facet;
-            let around = round_edge(self.triangulation, facet, a, b, third);
-            if around.iter().any(|&f| self.is_accepted(f)) {
+            let c = &self.candidates[index as usize];
+            let around = RoundEdge::new(self.triangulation, c.facet, c.edge(k), c.vertices[k]);
+            if around.clone().any(|f| self.is_accepted(f)) {
                 continue;
             }
             for f in around {
@@ -393,39 +251,21 @@ impl<'a> Greedy<'a> {
     }
 
     /// Accepted candidates round edge `k` of a candidate, itself left out.
-    fn neighbours_at(&self, index: u32, k: usize) -> Vec<u32> {
-        let c = &self.candidates[index as usize];
-        let [a, b] = c.edge(k);
+    fn neighbours_at(&self, index: u32, k: usize) -> impl Iterator<Item = u32> {
+        let [a, b] = self.candidates[index as usize].edge(k);
         // Few triangles meet at a vertex: its list is shorter than the walk round the edge.
         self.at_vertex[a.index()]
             .iter()
             .copied()
-            .filter(|&other| other != index && self.candidates[other as usize].vertices.contains(&b))
-            .collect()
+            .filter(move |&other| other != index && self.candidates[other as usize].vertices.contains(&b))
     }
 
     /// Continuity of a candidate across edge `k` with what is accepted there.
     fn continuity(&self, index: u32, k: usize) -> f64 {
         let c = &self.candidates[index as usize];
-        let [a, b] = c.edge(k);
-        let (pa, pb) = (self.position(a), self.position(b));
-        let edge = pb - pa;
-        let length = edge.length();
-        let across = |third: VertexId| {
-            let d = self.position(third) - pa;
-            (d - edge * (d.dot(edge) / (length * length))).normalize_or_zero()
-        };
-        let own = across(c.vertices[k]);
-        let mut sum = 0.0;
-        for other in self.neighbours_at(index, k) {
-            let o = &self.candidates[other as usize];
-            let third = o.vertices.into_iter().find(|v| *v != a && *v != b);
-            let theta = (-own.dot(across(third.expect("a triangle has a third vertex"))))
-                .clamp(-1.0, 1.0)
-                .acos();
-            sum += ((theta.exp() - 1.0).powi(2) - 1.0) * length / c.divisor;
-        }
-        sum
+        self.neighbours_at(index, k)
+            .map(|other| self.costs.fold(c, k, &self.candidates[other as usize]))
+            .sum()
     }
 
     fn renew_continuity(&mut self, index: u32) {
@@ -439,7 +279,7 @@ impl<'a> Greedy<'a> {
         for k in 0..3 {
             let c = &self.candidates[index as usize];
             let [a, b] = c.edge(k);
-            for facet in round_edge(self.triangulation, c.facet, a, b, c.vertices[k]) {
+            for facet in RoundEdge::new(self.triangulation, c.facet, [a, b], c.vertices[k]) {
                 let other = self.candidate_of[slot(self.canonical(facet))];
                 if other == NONE || self.candidates[other as usize].state != State::Waiting {
                     continue;
@@ -470,7 +310,7 @@ impl<'a> Greedy<'a> {
     fn consider(&mut self, index: u32) {
         let cost = self.candidates[index as usize].cost();
         for k in 0..3 {
-            while let [first, second, ..] = self.neighbours_at(index, k)[..] {
+            while let Some((first, second)) = self.two_at(index, k) {
                 // The dearer of the two gives way when it is dearer than this one.
                 let price = |i: u32| self.candidates[i as usize].cost();
                 let worst = if price(second) > price(first) {
@@ -513,6 +353,12 @@ impl<'a> Greedy<'a> {
         if self.second && self.candidates[index as usize].state == State::Accepted {
             self.offer_round(index);
         }
+    }
+
+    /// The first two accepted candidates at an edge that is full.
+    fn two_at(&self, index: u32, k: usize) -> Option<(u32, u32)> {
+        let mut at = self.neighbours_at(index, k);
+        Some((at.next()?, at.next()?))
     }
 
     fn accept(&mut self, index: u32) {
@@ -622,7 +468,10 @@ impl<'a> Greedy<'a> {
                 let c = &self.candidates[i as usize];
                 c.state == State::Accepted
                     && !c.preset
-                    && (0..3).filter(|&k| !self.neighbours_at(i, k).is_empty()).count() <= 1
+                    && (0..3)
+                        .filter(|&k| self.neighbours_at(i, k).next().is_some())
+                        .count()
+                        <= 1
             })
             .collect();
         for index in dangling {
@@ -651,53 +500,53 @@ impl<'a> Greedy<'a> {
     }
 }
 
-/// The facets round the edge `a b` of a facet whose third vertex is `c`, that facet left out, in the order of the walk.
-pub(super) fn round_edge(
-    triangulation: &Triangulation,
-    facet: Facet,
-    a: VertexId,
-    b: VertexId,
-    c: VertexId,
-) -> Vec<Facet> {
-    let mut out = Vec::with_capacity(8);
-    let mut tet = facet.tet;
-    let mut third = c;
-    loop {
-        let corners = triangulation.tet(tet);
-        let place = corners
-            .iter()
-            .position(|&v| v == third)
-            .expect("the walk enters through a facet of the tetrahedron");
-        let next = corners
-            .into_iter()
-            .find(|&v| v != a && v != b && v != third)
-            .expect("a tetrahedron has a fourth vertex");
-        if next == c {
-            return out;
+/// The facets round an edge of a facet, that facet left out, in the order of the walk.
+#[derive(Clone)]
+struct RoundEdge<'a> {
+    triangulation: &'a Triangulation,
+    edge: [VertexId; 2],
+    /// The third vertex of the first facet, at which the walk ends.
+    end: VertexId,
+    tet: TetId,
+    /// The third vertex of the facet entered through.
+    third: VertexId,
+}
+
+impl<'a> RoundEdge<'a> {
+    fn new(triangulation: &'a Triangulation, facet: Facet, edge: [VertexId; 2], end: VertexId) -> Self {
+        Self {
+            triangulation,
+            edge,
+            end,
+            tet: facet.tet,
+            third: end,
         }
-        let leave = Facet {
-            tet,
-            index: place as u8,
-        };
-        out.push(leave);
-        tet = triangulation.mirror(leave).tet;
-        third = next;
     }
 }
 
-fn median_half_edge(triangulation: &Triangulation) -> f64 {
-    let mut edges: Vec<(u32, u32)> = triangulation
-        .finite_tets()
-        .flat_map(|t| {
-            let v = triangulation.tet(t).map(|v| v.0);
-            [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)].map(|(i, j)| (v[i].min(v[j]), v[i].max(v[j])))
-        })
-        .collect();
-    edges.par_sort_unstable();
-    edges.dedup();
-    let lengths = edges
-        .iter()
-        .map(|&(i, j)| 0.5 * triangulation.points[i as usize].distance(triangulation.points[j as usize]))
-        .collect();
-    super::prepare::noise::median(lengths)
+impl Iterator for RoundEdge<'_> {
+    type Item = Facet;
+
+    fn next(&mut self) -> Option<Facet> {
+        let [a, b] = self.edge;
+        let corners = self.triangulation.tet(self.tet);
+        let place = corners
+            .iter()
+            .position(|&v| v == self.third)
+            .expect("the walk enters through a facet of the tetrahedron");
+        let next = corners
+            .into_iter()
+            .find(|&v| v != a && v != b && v != self.third)
+            .expect("a tetrahedron has a fourth vertex");
+        if next == self.end {
+            return None;
+        }
+        let leave = Facet {
+            tet: self.tet,
+            index: place as u8,
+        };
+        self.tet = self.triangulation.mirror(leave).tet;
+        self.third = next;
+        Some(leave)
+    }
 }

@@ -6,7 +6,7 @@
 //! * [`known_surface`]: a mesh or mask says where its surface is; one winding number a region ([`flood`]); [`refine`] adds
 //!   generators where that does not give the surface's topology.
 //! * [`cloud`]: a raw cloud is prepared ([`prepare`]: outliers, noise), shows its surface by greedy gap transforms
-//!   ([`gap_transforms`]), is closed ([`closure`]: [`diffusion`], [`labelling`] with [`min_cut`], [`islands`],
+//!   ([`gap_transforms`] at the price of [`gap_cost`]), is closed ([`closure`]: [`diffusion`], [`labelling`] with [`min_cut`], [`islands`],
 //!   [`star_repair`], [`adopt`], [`handles`]), judged open or closed ([`openness`]), oriented ([`orient`]), reported
 //!   ([`report`]) and looked over for faults ([`self_check`]).
 //! * [`mesh_repair`]: a damaged mesh keeps its good triangles; the rest is found anew from its points. [`mend()`] closes holes.
@@ -19,6 +19,7 @@ pub mod diffusion;
 pub mod error;
 pub mod facets;
 pub mod flood;
+pub mod gap_cost;
 pub mod gap_transforms;
 pub mod handles;
 pub mod islands;
@@ -41,7 +42,7 @@ mod stars;
 pub use balls::Balls;
 pub use cloud::{ClosedOrOpen, CloudSegregation, Denoise, SegregationSettings, segregate_cloud};
 pub use error::SegregationError;
-pub use gap_transforms::CostRule;
+pub use gap_cost::CostRule;
 pub use known_queries::KnownSurface;
 pub use known_surface::{
     KnownSurfaceReport, KnownSurfaceSegregation, KnownSurfaceSettings, RefinementPlace, RefinementReason,
