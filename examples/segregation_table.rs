@@ -2,11 +2,12 @@
 //!
 //! ```text
 //! cargo run --release --example segregation_table -- --n 10000 --seeds 3 --noise 0,0.05,0.1,0.25,0.5,0.75
-//!     [--shapes torus,bunny] [--density 20] [--outliers 0.05] [--verbose] [--rows] [--no-second] [--closed]
+//!     [--shapes torus,bunny] [--density 20] [--outliers 0.05] [--verbose] [--rows] [--no-second] [--closed] [--time]
 //! cargo run --release --example segregation_table -- --n 10000 --all-meshes [--verbose]
 //! ```
 //! "Right": closed, no open or non-manifold edge or vertex, the true Euler number and number of components. Distances are
-//! in mean spacings `sqrt(area / n)` against the true mesh, both ways. Real shapes are read from `../shared/data` (or
+//! in mean spacings `sqrt(area / n)` against the true mesh, both ways. `--time` prints every run's processor seconds (all
+//! threads, sampling and judging left out) instead of judging it. Real shapes are read from `../shared/data` (or
 //! `MEDIAL_DATA`) when they are there.
 
 #[path = "../tests/segregation_support/mod.rs"]
@@ -27,6 +28,7 @@ struct Options {
     outliers: f64,
     verbose: bool,
     rows: bool,
+    time: bool,
     settings: SegregationSettings,
 }
 
@@ -54,9 +56,11 @@ fn main() {
         "n {} seeds {} density 1:{} outliers {}",
         options.n, options.seeds, options.density, options.outliers
     );
-    println!(
-        "noise  right right+near runs | hausdorff med p95 max | mean | vol % med max | off % max | open bad | noise read min max | flagged wrong, flagged right | s med"
-    );
+    if !options.time {
+        println!(
+            "noise  right right+near runs | hausdorff med p95 max | mean | vol % med max | off % max | open bad | noise read min max | flagged wrong, flagged right | s med"
+        );
+    }
     let truths: Vec<(String, TriangleMesh)> = all_shapes()
         .into_iter()
         .filter(|(name, _)| options.shapes.is_empty() || options.shapes.contains(name))
@@ -65,12 +69,52 @@ fn main() {
         let mut rows = Vec::new();
         for (name, truth) in &truths {
             for seed in options.first_seed..options.first_seed + options.seeds {
+                if options.time {
+                    time(name, truth, noise, seed, &options);
+                    continue;
+                }
                 let row = run(name, truth, noise, seed, &options);
                 rows.push(row);
             }
         }
-        summary(noise, &rows);
+        if !options.time {
+            summary(noise, &rows);
+        }
     }
+}
+
+/// Processor seconds of this process so far, all threads, to a hundredth; 0 on systems without `/proc`.
+fn processor_seconds() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or("").split_whitespace().collect();
+    let ticks = |i: usize| fields.get(i).and_then(|f| f.parse::<f64>().ok()).unwrap_or(0.0);
+    (ticks(11) + ticks(12)) / 100.0
+}
+
+fn time(name: &str, truth: &TriangleMesh, noise: f64, seed: u64, options: &Options) {
+    let spacing = (truth.area() / options.n as f64).sqrt();
+    let points = corrupted(
+        truth,
+        options.n,
+        noise * spacing,
+        options.density,
+        options.outliers,
+        seed,
+    );
+    let (wall, before) = (Instant::now(), processor_seconds());
+    let result = segregate_cloud(&points, &options.settings).expect("a finite cloud");
+    println!(
+        "{name} {} points noise {noise} seed {seed}: {:.2} processor s, {:.2} wall s, Euler {}, {}",
+        points.len(),
+        processor_seconds() - before,
+        wall.elapsed().as_secs_f64(),
+        result.report.topology.euler,
+        if result.segregation.closed {
+            "closed"
+        } else {
+            "open"
+        },
+    );
 }
 
 fn parse() -> Options {
@@ -110,6 +154,7 @@ fn parse() -> Options {
         outliers: number("--outliers", 0.0),
         verbose: args.iter().any(|a| a == "--verbose"),
         rows: args.iter().any(|a| a == "--rows"),
+        time: args.iter().any(|a| a == "--time"),
         settings,
     }
 }

@@ -18,6 +18,7 @@ use super::error::SegregationError;
 use super::facets::FacetDepths;
 use super::gap_cost::CostRule;
 use super::gap_transforms::{GapTransforms, gap_transforms};
+use super::handles::NarrowHandle;
 use super::islands::Island;
 use super::labelling::{Labelled, LabellingProblem, RemovedHandle};
 use super::labels::boundary_triangles;
@@ -55,6 +56,8 @@ pub struct Closure {
     pub adopted: usize,
     /// Narrow handles that were not believed.
     pub opened: Vec<RemovedHandle>,
+    /// Narrow handles left, once [`Self::give_up_narrow_handles`] looked for them.
+    pub handles: Vec<NarrowHandle>,
     /// Points off the surface in the first run, dropped for the second.
     pub dropped: usize,
     /// Points off the surface at the end.
@@ -196,6 +199,7 @@ fn close_once(
         repair,
         adopted,
         opened: Vec::new(),
+        handles: Vec::new(),
         dropped: 0,
         off,
         iterations: diffusion.iterations,
@@ -226,6 +230,7 @@ impl Closure {
             repair: self.repair,
             adopted: self.adopted,
             opened: self.opened.clone(),
+            handles: self.handles.clone(),
         }
     }
 
@@ -239,6 +244,7 @@ impl Closure {
         self.repair = labelled.repair;
         self.adopted = labelled.adopted;
         self.opened = labelled.opened;
+        self.handles = labelled.handles;
     }
 
     /// Gives up narrow handles ([`super::labelling`], step 3).
@@ -246,7 +252,9 @@ impl Closure {
         let labelled = self
             .problem(&self.pull, least_component_share, 1.0)
             .without_narrow_handles(self.labelled());
-        if !labelled.opened.is_empty() {
+        if labelled.opened.is_empty() {
+            self.handles = labelled.handles;
+        } else {
             self.take(labelled);
         }
     }

@@ -442,24 +442,41 @@ fn finish(
     segregation
         .warnings
         .extend(report.doubts.iter().map(|d| d.text.clone()));
-    let tree = Neighbours::new(&closure.triangulation.points);
-    let nearest = tree
-        .nearest_many(points)
+    let source: Vec<u32> = closure
+        .used
         .iter()
-        .map(|n| VertexId(n.index))
+        .map(|&i| prepared.source[i as usize])
         .collect();
     Ok(CloudSegregation {
-        source: closure
-            .used
-            .iter()
-            .map(|&i| prepared.source[i as usize])
-            .collect(),
-        nearest,
+        nearest: nearest_generators(points, &closure.triangulation.points, &source),
+        source,
         spacing_mm: closure.spacing_mm,
         triangulation: closure.triangulation,
         segregation,
         report,
     })
+}
+
+/// For every point the generator nearest to it; a generator that was not moved is its own point's.
+fn nearest_generators(points: &[DVec3], generators: &[DVec3], source: &[u32]) -> Vec<VertexId> {
+    let mut nearest = vec![VertexId(u32::MAX); points.len()];
+    for (generator, &point) in source.iter().enumerate() {
+        if generators[generator] == points[point as usize] {
+            nearest[point as usize] = VertexId::from_index(generator);
+        }
+    }
+    let rest: Vec<u32> = (0..points.len() as u32)
+        .filter(|&i| nearest[i as usize].0 == u32::MAX)
+        .collect();
+    if rest.is_empty() {
+        return nearest;
+    }
+    let queries: Vec<DVec3> = rest.iter().map(|&i| points[i as usize]).collect();
+    let found = Neighbours::new(generators).nearest_many(&queries);
+    for (&i, n) in rest.iter().zip(&found) {
+        nearest[i as usize] = VertexId(n.index);
+    }
+    nearest
 }
 
 fn decide(share: f64, nothing_inside: bool, settings: &SegregationSettings) -> Decision {

@@ -6,20 +6,24 @@
 //!
 //! 1. Only components of positive genus are looked at.
 //! 2. Round every vertex the triangles of the vertices up to [`RINGS`] edges away are gathered. They are a disk when
-//!    `V - E + F = 1`, counted so that a border that touches itself counts as apart.
+//!    `V - E + F = 1`, counted so that a border that touches itself counts as apart. A disk [`SKIRT`] rings wider holds
+//!    those of all vertices within [`SKIRT`] edges, in which no loop can then fail to bound: they are not asked.
 //! 3. When they are not: either they have genus themselves, or two of their border loops are joined by the rest of the
 //!    surface. Both mean a loop that does not bound; border loops whose other sides are apart (a thin finger, a small
-//!    pocket) mean nothing.
+//!    pocket) mean nothing. The floods from the loops take turns, so that a small pocket costs no more than its size.
 //!
-//! Cost: `O(n)` for genus 0; else a few hundred triangles a vertex and one flood of the surface for each place that is not a
+//! Cost: `O(n)` for genus 0; else a few hundred triangles for every tenth vertex and one flood for each place that is not a
 //! disk, of which at most [`MOST_FLOODS`] are made.
 
 use crate::geometry::mesh::DisjointSets;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
 
 /// Edges from the middle vertex to the vertices whose triangles are gathered.
 const RINGS: u32 = 4;
+/// Rings that a disk may be wider, to answer for its inner vertices as well.
+const SKIRT: u32 = 2;
 /// The longest loop that such a neighbourhood must close round, edges.
 pub const LONGEST_LOOP: u32 = 2 * RINGS + 1;
 /// Floods of the whole surface at most, so that a sponge does not cost the square of its size.
@@ -64,6 +68,13 @@ pub fn narrow_handles(points: &[DVec3], triangles: &[[u32; 3]]) -> Vec<NarrowHan
     for v in 0..points.len() as u32 {
         if surface.out[v as usize] == NONE || !genus[v as usize] || done[v as usize] || floods >= MOST_FLOODS
         {
+            continue;
+        }
+        let wide = RINGS + SKIRT;
+        if ball.grow(&surface, v, wide, wide).is_none() {
+            for (&w, &ring) in ball.vertices.iter().zip(&ball.ring) {
+                done[w as usize] |= ring <= SKIRT;
+            }
             continue;
         }
         if ball.handle_round(&surface, v, RINGS, &mut floods).is_none() {
@@ -176,6 +187,8 @@ struct Ball {
     vertex_seen: Vec<bool>,
     /// Vertices all of whose triangles are members.
     whole: usize,
+    /// Flood that has a triangle; `NONE` between questions.
+    owner: Vec<u32>,
 }
 
 impl Ball {
@@ -187,6 +200,7 @@ impl Ball {
             member: vec![false; triangles],
             vertex_seen: vec![false; points],
             whole: 0,
+            owner: vec![NONE; triangles],
         }
     }
 
@@ -327,34 +341,50 @@ impl Ball {
         2 - loops - self.euler(surface) > 0
     }
 
-    /// Whether two border loops are joined by the rest of the surface.
-    fn borders_meet_outside(&self, surface: &Surface) -> bool {
+    /// Whether two border loops are joined by the rest of the surface. The floods from the loops take turns; once all but
+    /// one have run dry nothing is left to meet.
+    fn borders_meet_outside(&mut self, surface: &Surface) -> bool {
         let loops = self.loops(surface);
-        let mut owner = vec![NONE; surface.triangles.len()];
-        let mut stack = Vec::new();
+        let mut floods: Vec<VecDeque<u32>> = Vec::new();
+        let mut touched: Vec<u32> = Vec::new();
+        let mut meet = false;
         for (number, round) in loops.iter().enumerate() {
+            let mut flood = VecDeque::new();
             for &half in round {
-                let t = surface.twin[half as usize] / 3;
-                match owner[t as usize] {
-                    NONE => {
-                        owner[t as usize] = number as u32;
-                        stack.push(t);
-                    }
-                    o if o != number as u32 => return true,
-                    _ => {}
-                }
+                meet |= self.claim(
+                    surface.twin[half as usize] / 3,
+                    number as u32,
+                    &mut flood,
+                    &mut touched,
+                );
             }
-            while let Some(t) = stack.pop() {
+            floods.push(flood);
+        }
+        while !meet && floods.iter().filter(|f| !f.is_empty()).count() > 1 {
+            for (number, flood) in floods.iter_mut().enumerate() {
+                let Some(t) = flood.pop_front() else { continue };
                 for half in [3 * t, 3 * t + 1, 3 * t + 2] {
                     let other = surface.twin[half as usize] / 3;
-                    if !self.member[other as usize] && owner[other as usize] == NONE {
-                        owner[other as usize] = number as u32;
-                        stack.push(other);
-                    }
+                    meet |=
+                        !self.member[other as usize] && self.claim(other, number as u32, flood, &mut touched);
                 }
             }
         }
-        false
+        for t in touched {
+            self.owner[t as usize] = NONE;
+        }
+        meet
+    }
+
+    /// Takes a triangle for a flood; `true` when another flood has it.
+    fn claim(&mut self, t: u32, number: u32, flood: &mut VecDeque<u32>, touched: &mut Vec<u32>) -> bool {
+        let owner = &mut self.owner[t as usize];
+        if *owner == NONE {
+            *owner = number;
+            flood.push_back(t);
+            touched.push(t);
+        }
+        *owner != number
     }
 }
 

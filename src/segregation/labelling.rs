@@ -49,6 +49,8 @@ pub struct Labelled {
     pub adopted: usize,
     /// Narrow handles given up.
     pub opened: Vec<RemovedHandle>,
+    /// Narrow handles left, when they were looked for.
+    pub handles: Vec<NarrowHandle>,
 }
 
 /// A narrow handle that was not believed.
@@ -91,22 +93,19 @@ impl LabellingProblem<'_> {
             inside,
             ..Default::default()
         };
-        for round in 0..2 {
-            out.islands.extend(flip_islands(
-                self.triangulation,
-                &mut out.inside,
-                self.least_component_share,
-            ));
-            let done = repair_stars(self.triangulation, pull, &mut out.inside);
-            out.repair = StarRepair {
-                pinched: if round == 0 {
-                    done.pinched
-                } else {
-                    out.repair.pinched
-                },
-                flips: out.repair.flips + done.flips,
-                left: done.left,
-            };
+        let flip =
+            |inside: &mut Vec<bool>| flip_islands(self.triangulation, inside, self.least_component_share);
+        out.islands = flip(&mut out.inside);
+        out.repair = repair_stars(self.triangulation, pull, &mut out.inside);
+        // Once more when the repair changed anything, and the repair once more when that did.
+        if out.repair.flips > 0 {
+            let more = flip(&mut out.inside);
+            if !more.is_empty() {
+                let again = repair_stars(self.triangulation, pull, &mut out.inside);
+                out.repair.flips += again.flips;
+                out.repair.left = again.left;
+            }
+            out.islands.extend(more);
         }
         out.adopted = adopt_points(self.triangulation, self.spacing_mm, &mut out.inside);
         out
@@ -151,6 +150,7 @@ impl LabellingProblem<'_> {
         let mut best = first;
         let mut state = self.state(&best);
         if state.handles.is_empty() {
+            best.handles.clear();
             return best;
         }
         let mut pull = self.pull.to_vec();
@@ -182,6 +182,7 @@ impl LabellingProblem<'_> {
             state = attempt.state;
         }
         best.opened = opened;
+        best.handles = state.handles;
         best
     }
 

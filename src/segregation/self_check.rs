@@ -16,7 +16,7 @@
 
 use super::closure::Closure;
 use super::cloud::SegregationSettings;
-use super::handles::{NarrowHandle, narrow_handles};
+use super::handles::NarrowHandle;
 use super::labels::{boundary_triangles, mesh_of};
 use super::openness::{Rim, all_unsupported};
 use super::report::{CloudReport, SecondOpinion, Variation};
@@ -268,7 +268,7 @@ pub(super) fn self_check(
     spacing_mm: &[f64],
 ) -> SelfCheck {
     let mut out = SelfCheck {
-        narrow_handles: narrow_handles(&mesh.points, &mesh.triangles),
+        narrow_handles: closure.handles.clone(),
         ..Default::default()
     };
     out.spikes = all_unsupported(mesh.points.len(), &mesh.triangles, unsupported).len();
