@@ -107,6 +107,13 @@ fn check_says_what_an_open_mesh_is_fit_for() {
         Some(0)
     );
     assert_eq!(medial(&["check", open, "--for", "change"]).status.code(), Some(1));
+    // What `check` promises, `scaffold` keeps: one scaffold of both sides.
+    let out = medial(&["scaffold", open, "--json", "--side", "both"]);
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+    let json: serde_json::Value = serde_json::from_slice(&out.stdout).expect("one document");
+    assert_eq!(json["side"], "joined");
+    assert_eq!(json["topology"]["agree"], true);
+    assert!(stderr(&out).contains("both its sides"), "{}", stderr(&out));
 }
 
 #[test]

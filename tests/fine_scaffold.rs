@@ -53,6 +53,7 @@ fn betti_numbers_are_the_solids_by_three_routes() {
                 &refined.result.segregation,
                 Side::Interior
             )
+            .expect("labels of this triangulation")
         );
         assert_eq!(Some(found), mesh_betti(&surface));
     }
@@ -102,6 +103,7 @@ fn the_exterior_of_a_torus_has_a_hole_filled_by_its_hull_side() {
             &refined.result.segregation,
             Side::Exterior
         )
+        .expect("labels of this triangulation")
     );
 }
 

@@ -52,7 +52,7 @@ fn run(points: &[DVec3], inside: impl Fn(DVec3) -> bool) -> (FineScaffold, Regul
         fine_scaffold(&triangulation, &segregation, &FineScaffoldSettings::default()).expect("an inside");
     assert_eq!(
         fine.betti(),
-        solid_betti(&triangulation, &segregation, Side::Interior)
+        solid_betti(&triangulation, &segregation, Side::Interior).expect("labels of this triangulation")
     );
     let settings = RegulariseSettings {
         tolerance: Length::PercentDiagonal(1.0),

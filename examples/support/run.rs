@@ -55,7 +55,8 @@ pub fn run(
     let coarse = coarse_scaffold(&fine, &regularised, &CoarseScaffoldSettings::default());
     let t4 = Instant::now();
     Ok(Run {
-        solid: solid_betti(&refined.triangulation, segregation, Side::Interior),
+        solid: solid_betti(&refined.triangulation, segregation, Side::Interior)
+            .expect("labels of this triangulation"),
         known: mesh_betti(surface),
         fine,
         regularised,

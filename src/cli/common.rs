@@ -40,7 +40,7 @@ pub enum Side {
     /// Inside the shape: thickness, ridges, matching.
     #[default]
     Interior,
-    /// Outside: valleys and gaps.
+    /// Outside, as far as no large ball reaches: valleys and gaps.
     Exterior,
     /// Both.
     Both,
@@ -75,7 +75,7 @@ pub struct Common {
     #[arg(long, value_name = "LEN", global = true, help_heading = "Method")]
     pub tolerance: Option<Length>,
 
-    /// Side of the surface the scaffold is taken of.
+    /// Side of the surface the scaffold is taken of; an open surface has both, joined.
     #[arg(
         long,
         value_enum,

@@ -69,7 +69,7 @@ pub fn run(args: &ScaffoldArgs, common: &Common) -> Result<Verdict, Failure> {
         record.warnings = done.warnings.clone();
         if let Some(dir) = &args.output {
             let dir = if common.side.sides().len() > 1 {
-                dir.join(side_name(side))
+                dir.join(side_name(done.side))
             } else {
                 dir.clone()
             };
@@ -86,6 +86,10 @@ pub fn run(args: &ScaffoldArgs, common: &Common) -> Result<Verdict, Failure> {
         if !done.topology.agree {
             last = Verdict::SaidNo;
         }
+        // The scaffold of an open surface is that of both sides already.
+        if done.side == medial_scaffold::fine_scaffold::Side::Joined {
+            break;
+        }
     }
     Ok(last)
 }
@@ -94,6 +98,7 @@ fn side_name(side: medial_scaffold::fine_scaffold::Side) -> &'static str {
     match side {
         medial_scaffold::fine_scaffold::Side::Interior => "interior",
         medial_scaffold::fine_scaffold::Side::Exterior => "exterior",
+        medial_scaffold::fine_scaffold::Side::Joined => "joined",
     }
 }
 

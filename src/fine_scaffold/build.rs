@@ -1,6 +1,6 @@
 //! Building the fine scaffold.
 //!
-//! In: the triangulation and one side's labels. Out: the dual complex of the simplices in the interior of that side.
+//! In: the triangulation and a [`Domain`], one side of the surface. Out: the dual complex of the simplices in the interior of that side.
 //!
 //! 1. vertices: tetrahedra of the side, in id order, with circumcentre and circumradius;
 //! 2. edges: triangles between two of them;
@@ -17,8 +17,9 @@
 //! error, because no later stage could place it.
 
 use super::complex::{FineScaffold, NONE};
-use crate::delaunay::Triangulation;
+use super::domain::Domain;
 use crate::delaunay::triangulation::INFINITE;
+use crate::delaunay::{Facet, Triangulation};
 use crate::geometry::circumsphere::{self, Sphere};
 use crate::geometry::mesh::{DisjointSets, bounds};
 use crate::geometry::{LengthScale, TetId, VertexId};
@@ -35,8 +36,10 @@ pub enum Side {
     /// The solid.
     #[default]
     Interior,
-    /// The convex hull less the solid.
+    /// The convex hull less the solid, but for what a large ball reaches from outside; see [`super::domain`].
     Exterior,
+    /// Both sides of an open surface, one through its holes and round its rims; see [`super::domain`].
+    Joined,
 }
 
 /// Settings of the fine scaffold.
@@ -51,9 +54,7 @@ pub struct FineScaffoldSettings {
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum FineScaffoldError {
     /// The surface is open and has no inside.
-    #[error(
-        "the surface is open, so it has no inside and no interior scaffold; close it, or ask for the surface mesh only"
-    )]
+    #[error("the surface is open, so it has no inside; `medial mesh --closed` closes it")]
     Open,
     /// Labels of another triangulation.
     #[error(
@@ -65,10 +66,20 @@ pub enum FineScaffoldError {
         /// Number of tetrahedra.
         tets: usize,
     },
+    /// A surface that is not part of the triangulation.
+    #[error(
+        "{missing} of {triangles} surface triangles are not in the triangulation; segregation and triangulation do not belong together"
+    )]
+    Surface {
+        /// Triangles not found.
+        missing: usize,
+        /// Triangles of the surface.
+        triangles: usize,
+    },
     /// No tetrahedron is of the side.
     #[error(
-        "none of {tets} tetrahedra lies on the {side:?} side; the sampling is too coarse for this shape (lower --spacing) or the \
-         surface is inside out"
+        "none of {tets} tetrahedra lies on the {side:?} side: the sampling is too coarse for this shape (lower --spacing), the \
+         surface is inside out, or, outside, no part of it is deep enough to have a scaffold"
     )]
     Empty {
         /// Number of finite tetrahedra.
@@ -110,38 +121,42 @@ pub fn fine_scaffold(
     segregation: &Segregation,
     settings: &FineScaffoldSettings,
 ) -> Result<FineScaffold, FineScaffoldError> {
-    if segregation.inside.is_empty() && triangulation.num_tets() > 0 {
-        return Err(FineScaffoldError::Open);
-    }
-    if segregation.inside.len() != triangulation.num_tets() {
-        return Err(FineScaffoldError::Labels {
-            labels: segregation.inside.len(),
-            tets: triangulation.num_tets(),
-        });
-    }
-    let of_side: Vec<bool> = triangulation
-        .tets()
-        .map(|t| triangulation.is_finite(t) && segregation.is_inside(t) == (settings.side == Side::Interior))
-        .collect();
-    let dual = Vertices::new(triangulation, &of_side);
+    fine_scaffold_of(
+        triangulation,
+        &Domain::new(triangulation, segregation, settings.side)?,
+    )
+}
+
+/// Makes the fine scaffold of a domain.
+///
+/// # Errors
+/// [`FineScaffoldError`]: an empty domain, a flat tetrahedron.
+///
+/// # Complexity
+/// `O(tetrahedra)` time and space.
+pub fn fine_scaffold_of(
+    triangulation: &Triangulation,
+    domain: &Domain,
+) -> Result<FineScaffold, FineScaffoldError> {
+    let dual = Vertices::new(triangulation, domain);
     if dual.tets.is_empty() {
         return Err(FineScaffoldError::Empty {
             tets: triangulation.num_finite(),
-            side: settings.side,
+            side: domain.side(),
         });
     }
     let balls = circumballs(triangulation, &dual.tets)?;
-    let edges = edges(triangulation, &dual);
-    let facets = facets(triangulation, &dual, &edges.of_vertex);
+    let edges = edges(triangulation, domain, &dual);
+    let facets = facets(triangulation, domain, &dual, &edges.of_vertex);
     let (edge_facet_start, edge_facets) = incidence(edges.vertices.len(), &facets.start, &facets.ring_edges);
-    let cells = cells(triangulation, &of_side, &facets.generators);
-    let (generator_region, num_regions) = regions(triangulation, &of_side);
+    let cells = cells(triangulation, domain, &facets.generators);
+    let (generator_region, num_regions) = regions(triangulation, domain);
     let outside = (0..dual.tets.len())
         .into_par_iter()
-        .map(|v| !circumcentre_is_of_side(triangulation, &of_side, dual.tets[v], balls[v].centre))
+        .map(|v| !circumcentre_is_of_side(triangulation, domain, dual.tets[v], balls[v].centre))
         .collect();
     Ok(FineScaffold {
-        scale: scale(triangulation, &of_side),
+        scale: scale(triangulation, domain),
         generator_position: triangulation.points.clone(),
         generator_volume: generator_volumes(triangulation, &dual.tets),
         generator_region,
@@ -172,10 +187,10 @@ struct Vertices {
 }
 
 impl Vertices {
-    fn new(triangulation: &Triangulation, of_side: &[bool]) -> Self {
+    fn new(triangulation: &Triangulation, domain: &Domain) -> Self {
         let mut of_tet = vec![NONE; triangulation.num_tets()];
         let mut tets = Vec::new();
-        for t in triangulation.finite_tets().filter(|t| of_side[t.index()]) {
+        for t in triangulation.finite_tets().filter(|&t| domain.has(t)) {
             of_tet[t.index()] = tets.len() as u32;
             tets.push(t);
         }
@@ -203,7 +218,7 @@ struct Edges {
     of_vertex: Vec<[u32; 4]>,
 }
 
-fn edges(triangulation: &Triangulation, dual: &Vertices) -> Edges {
+fn edges(triangulation: &Triangulation, domain: &Domain, dual: &Vertices) -> Edges {
     let mut out = Edges {
         vertices: Vec::with_capacity(2 * dual.tets.len()),
         generators: Vec::with_capacity(2 * dual.tets.len()),
@@ -211,10 +226,12 @@ fn edges(triangulation: &Triangulation, dual: &Vertices) -> Edges {
     };
     for (v, &tet) in dual.tets.iter().enumerate() {
         for index in 0..4u8 {
-            let facet = crate::delaunay::Facet { tet, index };
-            let mirror = triangulation.mirror(facet);
+            let facet = Facet { tet, index };
+            let Some(mirror) = domain.beyond(triangulation, facet) else {
+                continue;
+            };
             let w = dual.of_tet[mirror.tet.index()];
-            if w == NONE || (w as usize) < v {
+            if (w as usize) < v {
                 continue;
             }
             let e = out.vertices.len() as u32;
@@ -238,7 +255,12 @@ struct Facets {
 /// Vertices whose facets are gathered in one task; the result does not depend on it.
 const CHUNK: usize = 4096;
 
-fn facets(triangulation: &Triangulation, dual: &Vertices, edges_of_vertex: &[[u32; 4]]) -> Facets {
+fn facets(
+    triangulation: &Triangulation,
+    domain: &Domain,
+    dual: &Vertices,
+    edges_of_vertex: &[[u32; 4]],
+) -> Facets {
     let parts: Vec<Facets> = dual
         .tets
         .par_chunks(CHUNK)
@@ -247,7 +269,7 @@ fn facets(triangulation: &Triangulation, dual: &Vertices, edges_of_vertex: &[[u3
             let mut ring = Vec::with_capacity(32);
             for &tet in tets {
                 for pair in AROUND {
-                    if let Some(generators) = walk_ring(triangulation, dual, tet, pair, &mut ring) {
+                    if let Some(generators) = walk_ring(triangulation, domain, dual, tet, pair, &mut ring) {
                         out.generators.push(generators);
                         out.start.push(ring.len() as u32);
                         for &(v, exit) in &ring {
@@ -279,6 +301,7 @@ fn facets(triangulation: &Triangulation, dual: &Vertices, edges_of_vertex: &[[u3
 /// `None` when the ring leaves the side or when `tet` is not its smallest member (the ring is found there).
 fn walk_ring(
     triangulation: &Triangulation,
+    domain: &Domain,
     dual: &Vertices,
     tet: TetId,
     ([i, j], [k, l]): ([usize; 2], [usize; 2]),
@@ -293,14 +316,15 @@ fn walk_ring(
     let mut at = tet;
     loop {
         ring.push((dual.of_tet[at.index()], exit as u8));
-        let mirror = triangulation.mirror(crate::delaunay::Facet {
+        let facet = Facet {
             tet: at,
             index: exit as u8,
-        });
+        };
+        let mirror = domain.beyond(triangulation, facet)?;
         if mirror.tet == tet {
             return Some([a.min(b), a.max(b)]);
         }
-        if mirror.tet < tet || dual.of_tet[mirror.tet.index()] == NONE {
+        if mirror.tet < tet {
             return None;
         }
         at = mirror.tet;
@@ -336,23 +360,11 @@ struct Cells {
     facets: Vec<u32>,
 }
 
-fn cells(triangulation: &Triangulation, of_side: &[bool], facet_generators: &[[VertexId; 2]]) -> Cells {
+fn cells(triangulation: &Triangulation, domain: &Domain, facet_generators: &[[VertexId; 2]]) -> Cells {
     let n = triangulation.points.len();
-    let (mut in_side, mut off_side) = (vec![false; n], vec![false; n]);
-    for t in triangulation.tets() {
-        let seen = if of_side[t.index()] {
-            &mut in_side
-        } else {
-            &mut off_side
-        };
-        for v in triangulation.tet(t) {
-            if v != INFINITE {
-                seen[v.index()] = true;
-            }
-        }
-    }
+    let bounding = domain.bounding_generators(triangulation);
     let generator: Vec<VertexId> = (0..n)
-        .filter(|&g| in_side[g] && !off_side[g])
+        .filter(|&g| !bounding[g])
         .map(VertexId::from_index)
         .collect();
     let mut cell_of = vec![NONE; n];
@@ -380,15 +392,20 @@ fn cells(triangulation: &Triangulation, of_side: &[bool], facet_generators: &[[V
 }
 
 /// Components of the complement: the cells of two generators meet across a Voronoi facet that is not in the complex
-/// exactly when some tetrahedron of the other side (a ghost included) holds both.
-fn regions(triangulation: &Triangulation, of_side: &[bool]) -> (Vec<u32>, u32) {
+/// exactly when some tetrahedron of the other side (a ghost included) or some wall holds both.
+fn regions(triangulation: &Triangulation, domain: &Domain) -> (Vec<u32>, u32) {
     let n = triangulation.points.len();
     let mut sets = DisjointSets::new(n);
-    for t in triangulation.tets().filter(|t| !of_side[t.index()]) {
+    for t in triangulation.tets().filter(|&t| !domain.has(t)) {
         let corners = triangulation.tet(t);
         for v in corners.iter().filter(|v| **v != INFINITE) {
             sets.union(corners[0].0, v.0);
         }
+    }
+    for f in triangulation.facets().filter(|&f| domain.is_wall(f)) {
+        let [a, b, c] = triangulation.facet_vertices(f);
+        sets.union(a.0, b.0);
+        sets.union(a.0, c.0);
     }
     let mut number = vec![NONE; n];
     let mut count = 0;
@@ -417,18 +434,15 @@ fn generator_volumes(triangulation: &Triangulation, tets: &[TetId]) -> Vec<f64> 
     volume
 }
 
-fn scale(triangulation: &Triangulation, of_side: &[bool]) -> LengthScale {
+fn scale(triangulation: &Triangulation, domain: &Domain) -> LengthScale {
     let diagonal_mm = bounds(&triangulation.points).map_or(0.0, |[lo, hi]| (hi - lo).length());
     let mut area = 0.0;
     let mut on_boundary = vec![false; triangulation.points.len()];
     for f in triangulation.facets() {
-        if of_side[f.tet.index()] == of_side[triangulation.mirror(f).tet.index()] {
+        if !domain.on_surface(triangulation, f) {
             continue;
         }
         let ids = triangulation.facet_vertices(f);
-        if ids.contains(&INFINITE) {
-            continue;
-        }
         let [a, b, c] = ids.map(|v| triangulation.points[v.index()]);
         area += 0.5 * (b - a).cross(c - a).length();
         for v in ids {
@@ -445,21 +459,22 @@ fn scale(triangulation: &Triangulation, of_side: &[bool]) -> LengthScale {
 /// Longest walk to a circumcentre; longer ones are cut short by rounding only and end where they are.
 const MAX_WALK: usize = 256;
 
-/// Walks from a tetrahedron to its circumcentre and asks the tetrahedron found there. Rounding may stop the walk in a
-/// neighbour of the right one, which matters only for circumcentres on the surface, whose radius is about zero.
+/// Walks from a tetrahedron to its circumcentre and asks the tetrahedron found there, or, where walls alone part the sides, whether it
+/// came through one. Rounding may stop the walk in a neighbour of the right one, which matters only for circumcentres on the
+/// surface, whose radius is about zero.
 fn circumcentre_is_of_side(
     triangulation: &Triangulation,
-    of_side: &[bool],
+    domain: &Domain,
     tet: TetId,
     centre: DVec3,
 ) -> bool {
     let (mut at, mut from) = (tet, tet);
+    let mut walls = 0;
     for _ in 0..MAX_WALK {
         if !triangulation.is_finite(at) {
-            return of_side[at.index()];
+            break;
         }
-        let beyond = (0..4u8).find(|&index| {
-            let facet = crate::delaunay::Facet { tet: at, index };
+        let beyond = (0..4u8).map(|index| Facet { tet: at, index }).find(|&facet| {
             let next = triangulation.mirror(facet).tet;
             let [a, b, c] = triangulation
                 .facet_vertices(facet)
@@ -468,11 +483,15 @@ fn circumcentre_is_of_side(
         });
         match beyond {
             None => break,
-            Some(index) => {
+            Some(facet) => {
+                walls += usize::from(domain.is_wall(facet));
                 from = at;
-                at = triangulation.neighbour(at, index as usize);
+                at = triangulation.mirror(facet).tet;
             }
         }
     }
-    of_side[at.index()]
+    match domain.side() {
+        Side::Joined => walls % 2 == 0,
+        Side::Interior | Side::Exterior => domain.has(at),
+    }
 }

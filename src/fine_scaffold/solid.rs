@@ -8,36 +8,50 @@
 //! boundary components less `b0`, and half the Euler number of the boundary is `b0 - b1 + b2` (Hatcher, Algebraic Topology,
 //! 3.3 and Alexander duality). Cost `O(tetrahedra)`.
 
-use super::build::Side;
+use super::build::{FineScaffoldError, Side};
 use super::complex::{Betti, NONE};
+use super::domain::Domain;
 use crate::delaunay::{Facet, Triangulation};
 use crate::geometry::TriangleMesh;
 use crate::geometry::mesh::DisjointSets;
 use crate::segregation::Segregation;
 
-/// Betti numbers of the interior of the union of the tetrahedra of one side.
-pub fn solid_betti(triangulation: &Triangulation, segregation: &Segregation, side: Side) -> Betti {
-    let of_side = |t| triangulation.is_finite(t) && segregation.is_inside(t) == (side == Side::Interior);
+/// Betti numbers of one side of the surface.
+///
+/// # Errors
+/// Those of [`Domain::new`].
+pub fn solid_betti(
+    triangulation: &Triangulation,
+    segregation: &Segregation,
+    side: Side,
+) -> Result<Betti, FineScaffoldError> {
+    Ok(solid_betti_of(
+        triangulation,
+        &Domain::new(triangulation, segregation, side)?,
+    ))
+}
+
+/// Betti numbers of a domain: the interior of a union of tetrahedra, less walls. A wall is boundary on both its sides.
+pub fn solid_betti_of(triangulation: &Triangulation, domain: &Domain) -> Betti {
+    let of_domain = || triangulation.finite_tets().filter(|&t| domain.has(t));
     let mut parts = DisjointSets::new(triangulation.num_tets());
     let mut b0 = 0i64;
     let mut boundary = Vec::new();
     let mut slot = vec![NONE; 4 * triangulation.num_finite()];
-    for tet in triangulation.finite_tets().filter(|&t| of_side(t)) {
+    for tet in of_domain() {
         b0 += 1;
         for index in 0..4u8 {
             let facet = Facet { tet, index };
-            let next = triangulation.mirror(facet).tet;
-            if !of_side(next) {
+            if domain.beyond(triangulation, facet).is_none() {
                 slot[4 * tet.index() + index as usize] = boundary.len() as u32;
                 boundary.push(facet);
             }
         }
     }
-    for tet in triangulation.finite_tets().filter(|&t| of_side(t)) {
-        for index in 0..4 {
-            let next = triangulation.neighbour(tet, index);
-            if of_side(next) {
-                b0 -= i64::from(parts.union(tet.0, next.0));
+    for tet in of_domain() {
+        for index in 0..4u8 {
+            if let Some(next) = domain.beyond(triangulation, Facet { tet, index }) {
+                b0 -= i64::from(parts.union(tet.0, next.tet.0));
             }
         }
     }
@@ -47,7 +61,7 @@ pub fn solid_betti(triangulation: &Triangulation, segregation: &Segregation, sid
     for (i, &facet) in boundary.iter().enumerate() {
         let i = i as u32;
         for opposite in (0..4).filter(|&k| k != facet.index as usize) {
-            let other = across(triangulation, &of_side, facet, opposite);
+            let other = across(triangulation, domain, facet, opposite);
             surfaces.union(i, slot_of(other));
             for place in (0..4).filter(|&k| k != facet.index as usize && k != opposite) {
                 let v = triangulation.tet(facet.tet)[place];
@@ -57,7 +71,7 @@ pub fn solid_betti(triangulation: &Triangulation, segregation: &Segregation, sid
             }
         }
     }
-    let patches = patches(triangulation, &of_side);
+    let patches = patches(triangulation, domain);
     let euler_of_vertices = euler_of_vertices(triangulation, &boundary, &mut corners, patches, &mut surfaces);
     let components = (0..boundary.len() as u32)
         .filter(|&i| surfaces.find(i) == i)
@@ -74,18 +88,23 @@ pub fn solid_betti(triangulation: &Triangulation, segregation: &Segregation, sid
 
 /// The patches of every generator's link: corners `4 * tet + place` of tetrahedra of the side, joined across the
 /// triangles between them that hold the generator.
-fn patches(triangulation: &Triangulation, of_side: &impl Fn(crate::geometry::TetId) -> bool) -> DisjointSets {
+fn patches(triangulation: &Triangulation, domain: &Domain) -> DisjointSets {
     let mut patches = DisjointSets::new(4 * triangulation.num_finite());
-    for tet in triangulation.finite_tets().filter(|&t| of_side(t)) {
-        for index in 0..4 {
-            let next = triangulation.neighbour(tet, index);
-            if next < tet || !of_side(next) {
+    for tet in triangulation.finite_tets().filter(|&t| domain.has(t)) {
+        for index in 0..4u8 {
+            let Some(next) = domain.beyond(triangulation, Facet { tet, index }) else {
+                continue;
+            };
+            if next.tet < tet {
                 continue;
             }
-            let there = triangulation.tet(next);
-            for (place, v) in triangulation.tet(tet).iter().enumerate().filter(|p| p.0 != index) {
+            let there = triangulation.tet(next.tet);
+            for (place, v) in triangulation.tet(tet).iter().enumerate() {
+                if place == index as usize {
+                    continue;
+                }
                 if let Some(k) = there.iter().position(|w| w == v) {
-                    patches.union(4 * tet.0 + place as u32, 4 * next.0 + k as u32);
+                    patches.union(4 * tet.0 + place as u32, 4 * next.tet.0 + k as u32);
                 }
             }
         }
@@ -126,12 +145,7 @@ fn euler_of_vertices(
 }
 
 /// The boundary facet met when turning from `facet` through the solid about its edge that misses corner `opposite`.
-fn across(
-    triangulation: &Triangulation,
-    of_side: &impl Fn(crate::geometry::TetId) -> bool,
-    facet: Facet,
-    opposite: usize,
-) -> Facet {
+fn across(triangulation: &Triangulation, domain: &Domain, facet: Facet, opposite: usize) -> Facet {
     // The edge is kept; `pivot` is the corner of the current tetrahedron not on the facet last crossed.
     let mut at = facet.tet;
     let mut exit = opposite;
@@ -141,10 +155,9 @@ fn across(
             tet: at,
             index: exit as u8,
         };
-        let mirror = triangulation.mirror(out);
-        if !of_side(mirror.tet) {
+        let Some(mirror) = domain.beyond(triangulation, out) else {
             return out;
-        }
+        };
         // In the next tetrahedron leave opposite the corner of the crossed facet that is not on the edge: the old `entered`.
         let kept = triangulation.tet(at)[entered];
         at = mirror.tet;

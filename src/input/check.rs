@@ -261,7 +261,7 @@ fn uses(content: &CheckContent, useless: bool) -> Vec<Use> {
         _ if t.boundary_edges > 0 || mesh.orientation == Orientation::OneSided => all([
             (
                 true,
-                "as a sheet that bounds nothing: the cloud of its points (`medial mesh --open` keeps it open)",
+                "as an open surface: the scaffold of both its sides, joined, of the cloud of its points",
             ),
             (true, "as a part of a surface"),
             (

@@ -137,7 +137,11 @@ fn prepare(
     observer: Observer,
 ) -> Result<Prepared, StageError> {
     let (mut stages, mut warnings) = (Vec::new(), Vec::new());
-    let (scaffold, why_not) = match scaffold::run(shape, &settings.scaffold, observer, &format!("{role} ")) {
+    let scaffold_settings = ScaffoldSettings {
+        refuse_open: true,
+        ..settings.scaffold.clone()
+    };
+    let (scaffold, why_not) = match scaffold::run(shape, &scaffold_settings, observer, &format!("{role} ")) {
         Ok(run) => (Some(run), None),
         // An open shape has no inside, hence no scaffold; its surface can still be matched.
         Err(e @ (StageError::FineScaffold(_) | StageError::Segregation(_))) => (None, Some(e)),

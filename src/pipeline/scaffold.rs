@@ -4,7 +4,7 @@
 //! 2. Delaunay triangulation and segregation: by the known surface, refined where its topology asks for it; by gap transforms and closure
 //!    for a cloud or an open mesh.
 //! 3. Full scaffold: flow and the Morse identity.
-//! 4. Fine scaffold of one side, regularised, made into the coarse scaffold.
+//! 4. Fine scaffold of one side (of both, joined, when the surface stays open), regularised, made into the coarse scaffold.
 //! 5. Betti numbers of the solid by an independent route, fidelity, summaries.
 
 use super::documents::{Counts, Fidelity, ScaffoldDocument, SurfaceSummary, TopologySummary};
@@ -12,7 +12,7 @@ use super::error::{PipelineError, StageError};
 use super::timing::{Observer, StageTime, Stages};
 use crate::coarse_scaffold::{CoarseScaffold, CoarseScaffoldSettings, coarse_scaffold};
 use crate::delaunay::Triangulation;
-use crate::fine_scaffold::{FineScaffold, FineScaffoldSettings, Side, fine_scaffold, solid_betti};
+use crate::fine_scaffold::{Domain, FineScaffold, Side, fine_scaffold_of, solid_betti_of};
 use crate::full_scaffold::{CriticalCounts, full_scaffold};
 use crate::geometry::{Length, TriangleMesh};
 use crate::input::sampling::{SamplingSettings, sample};
@@ -36,6 +36,8 @@ pub struct ScaffoldSettings {
     pub cloud: SegregationSettings,
     /// Side of the surface.
     pub side: Side,
+    /// Whether an open surface, which has no inside, is an error; otherwise it gets the scaffold of both its sides, [`Side::Joined`].
+    pub refuse_open: bool,
     /// Regularisation, with the tolerance.
     pub regularise: RegulariseSettings,
     /// Least tolerance for a mask, in its largest voxel edges; 0 for none. A mask does not know its surface better than half a voxel,
@@ -104,9 +106,17 @@ pub(super) fn run(
     let mut notes = shape.notes.clone();
     let sided = side_of_surface(shape, settings, &mut stages, &mut notes, &mut warnings)?;
     let full = stages.run("full scaffold", || full_scaffold(&sided.triangulation))?;
-    let fine_settings = FineScaffoldSettings { side: settings.side };
+    let open = sided.segregation.inside.is_empty() && !settings.refuse_open;
+    let side = if open { Side::Joined } else { settings.side };
+    if open {
+        warnings.push(
+            "the surface is open and has no inside: this is one scaffold of both its sides; `medial mesh --closed` closes the surface"
+                .to_owned(),
+        );
+    }
+    let domain = Domain::new(&sided.triangulation, &sided.segregation, side)?;
     let fine = stages.run("fine scaffold", || {
-        fine_scaffold(&sided.triangulation, &sided.segregation, &fine_settings)
+        fine_scaffold_of(&sided.triangulation, &domain)
     })?;
     let regularise_settings = RegulariseSettings {
         tolerance: tolerance_of_mask(shape, settings, &fine, &mut notes),
@@ -116,14 +126,12 @@ pub(super) fn run(
     let coarse = stages.run("coarse scaffold", || {
         coarse_scaffold(&fine, &regularised, &settings.coarse)
     });
-    let solid = stages.run("topology", || {
-        solid_betti(&sided.triangulation, &sided.segregation, settings.side)
-    });
+    let solid = stages.run("topology", || solid_betti_of(&sided.triangulation, &domain));
     let topology = TopologySummary::new(solid, regularised.betti());
     warnings.extend(sided.segregation.warnings.iter().cloned());
     Ok(ScaffoldRun {
         name: shape.name.clone(),
-        side: settings.side,
+        side,
         surface: sided.segregation.surface(&sided.triangulation),
         triangulation: sided.triangulation,
         segregation: sided.segregation,
