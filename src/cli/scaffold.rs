@@ -122,7 +122,9 @@ fn summary(done: &ScaffoldRun) -> String {
         s.triangles,
         s.euler,
         s.volume
-            .map_or(String::from("open, "), |v| format!("closed, {v:.2} mm^3, ")),
+            .map_or(String::from("no volume (open or not manifold), "), |v| format!(
+                "closed, {v:.2} mm^3, "
+            )),
         s.area,
         <[i64; 3]>::from(t.solid_betti),
         <[i64; 3]>::from(t.scaffold_betti),

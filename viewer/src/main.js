@@ -10,6 +10,8 @@ const KINDS = [
   ['surface', 'Surface'], ['sheet', 'Sheets'], ['axial', 'Axial curves'], ['rib', 'Ribs'], ['wire', 'Wires'],
   ['seam', 'Seams'], ['node', 'Nodes'], ['correspondence', 'Correspondences'], ['mark', 'Marks'],
 ];
+// One layer each; the others may hold many things in one.
+const ELEMENTS = new Set(['sheet', 'axial', 'rib', 'wire', 'seam', 'node']);
 const SHAPES = { target: 'Target', source: 'Source', baseline: 'Baseline', followup: 'Follow-up' };
 const say = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
@@ -225,7 +227,7 @@ class Viewer {
         const key = `${kind}|${shape}`;
         const swatch = kind === 'sheet' ? 'linear-gradient(90deg,#e09f3e 33%,#3a86c8 33% 66%,#5ba85f 66%)'
           : `#${of[0].colour.getHexString()}`;
-        const { row, input } = checkbox(word, this.shown.get(key), swatch, of.length > 1 ? of.length : undefined,
+        const { row, input } = checkbox(word, this.shown.get(key), swatch, of.length > 1 || ELEMENTS.has(kind) ? of.length : undefined,
           (on) => { this.shown.set(key, on); this.apply(); });
         input.dataset.layer = key;
         layerRows.push(row);
