@@ -78,7 +78,7 @@ fn figures(report: &mut Report, r: &Value, motion: &Rigid) {
     if let Some(v) = number(r, "shape_distance") {
         report
             .figures
-            .push(KeyFigure::new("Shape distance", pretty(v), ""));
+            .push(KeyFigure::new("Shape distance", pretty(v), "mm").note("size counts"));
     }
     let angle = if motion.is_mirrored() {
         let unmirrored = Rigid {
@@ -164,6 +164,23 @@ fn pose(r: &Value, motion: &Rigid) -> Section {
     section
 }
 
+/// A field of the difference in words, with the short name people search for.
+fn quantity(key: &str) -> String {
+    match key {
+        "volume_target" => "volume, target".to_owned(),
+        "volume_source" => "volume, source".to_owned(),
+        "volume_change_percent" => "volume, target to source".to_owned(),
+        "area_target" => "surface area, target".to_owned(),
+        "area_source" => "surface area, source".to_owned(),
+        "area_change_percent" => "surface area, target to source".to_owned(),
+        "hausdorff" => "largest surface distance (Hausdorff)".to_owned(),
+        "hd95" => "95th percentile of the surface distance (HD95)".to_owned(),
+        "assd" => "mean surface distance, both ways (ASSD)".to_owned(),
+        "rms" => "root mean square surface distance (RMS)".to_owned(),
+        other => other.replace('_', " "),
+    }
+}
+
 fn difference(r: &Value) -> Section {
     let mut section = Section::new("Shape difference");
     let Some(Value::Object(map)) = at(r, "difference") else {
@@ -180,7 +197,7 @@ fn difference(r: &Value) -> Section {
         } else {
             "mm"
         };
-        table.row([key.replace('_', " ").into(), cell(value, ""), unit.into()]);
+        table.row([quantity(key).into(), cell(value, ""), unit.into()]);
     }
     section.tables.push(table);
     let sheets = items(r, "difference.per_sheet");
