@@ -7,7 +7,7 @@
 //! shallow dent and the hull, balls grow without bound and say where the hull is, not how the shape is. On a hand of 10 000 points
 //! their centres lie up to 10^14 diagonals away, and hundreds of pockets of a few tetrahedra each hang about the shape.
 //!
-//! 1. From the hull inwards, tetrahedra go whose ball is larger than two fifths of the diagonal, or touches the shape within a
+//! 1. From the hull inwards, tetrahedra go whose ball is larger than a quarter of the diagonal (0.4 about an open surface), or touches the shape within a
 //!    small part of itself only: the longest edge less than a fifth of its diameter (an object angle of 23 degrees). The first is an alpha shape
 //!    (Edelsbrunner and Muecke, ACM Transactions on Graphics 13, 1994); the second leaves out dents less than about a
 //!    twentieth as deep as wide. What no such ball reaches from outside stays, whatever its size.
@@ -15,13 +15,17 @@
 //!
 //! Which part of the outside has a scaffold is thereby a choice, and its Betti numbers are those of what is left. Cost `O(t)`.
 
+use super::build::Side;
 use super::domain::Domain;
 use crate::delaunay::{Facet, Triangulation};
 use crate::geometry::mesh::{DisjointSets, bounds};
 use crate::geometry::{TetId, circumsphere};
 
-/// Radius of the largest ball, in diagonals of the generators' box. More than the third that the ball of a hemisphere has.
-const LARGEST_RADIUS_DIAG: f64 = 0.4;
+/// Radius of the largest ball about an open surface, in diagonals of the generators' box: more than the third that the ball of a hemisphere has.
+const LARGEST_JOINED_DIAG: f64 = 0.4;
+
+/// The same outside a solid. With less, strips of tetrahedra along valleys are left, whose scaffold zigzags; with more, centres scatter with the sampling.
+const LARGEST_EXTERIOR_DIAG: f64 = 0.25;
 
 /// Least length of a tetrahedron's longest edge, in diameters of its ball.
 const LEAST_SPREAD: f64 = 0.2;
@@ -33,7 +37,11 @@ const SHALLOWEST_POCKET_DIAG: f64 = 0.001;
 /// Takes tetrahedra out of the domain.
 pub(super) fn carve(triangulation: &Triangulation, domain: &mut Domain) {
     let diagonal_mm = bounds(&triangulation.points).map_or(0.0, |[lo, hi]| (hi - lo).length());
-    roll_from_outside(triangulation, domain, LARGEST_RADIUS_DIAG * diagonal_mm);
+    let largest_diag = match domain.side() {
+        Side::Joined => LARGEST_JOINED_DIAG,
+        Side::Interior | Side::Exterior => LARGEST_EXTERIOR_DIAG,
+    };
+    roll_from_outside(triangulation, domain, largest_diag * diagonal_mm);
     leave_out_pockets(triangulation, domain, SHALLOWEST_POCKET_DIAG * diagonal_mm);
 }
 
