@@ -2,20 +2,22 @@
 //!
 //! In: tetrahedra as the insertion left them. Out: [`Triangulation`], which no longer shows how it was built. Steps:
 //! 1. rename the vertices of every tetrahedron and rotate it by an even permutation, so that its smallest vertex comes first
-//!    and the next smallest second (ghosts: smallest first, infinite last);
-//! 2. deal tetrahedra into one bucket for each smallest vertex, finite before ghosts, and sort each bucket (about seven); a
-//!    task does this for a range of vertices and passes over all tetrahedra, which costs little beside dealing them;
+//!    and the next smallest second (ghosts: smallest first, infinite last); count the tetrahedra of each smallest vertex;
+//! 2. deal finite tetrahedra into one bucket for each smallest vertex and sort each bucket (about seven); a task does this
+//!    for a range of vertices and passes over all tetrahedra, which costs little beside dealing them; sort the ghosts;
 //! 3. rename neighbours, in the old order: the tetrahedra around each other are then near in memory, and each new place is
 //!    met once. The words are atomic so that threads can share the array; on common processors their stores are plain ones.
 //!
-//! Cost: `O(n)` besides the buckets; the old and the new arrays are never all in memory at once.
+//! Cost: `O(n)` besides buckets and ghosts; the old and the new arrays are never all in memory at once. A third of the time
+//! is the system's, handing out pages, and another third waits for lines of memory of the scattered writes: neither huge
+//! pages (slow to be had on virtual machines), nor curves cut into slabs of x (the insertion loses more), nor counting in
+//! vector registers (buckets are too small) made it faster.
 
 use super::insertion::INF;
 use super::triangulation::Triangulation;
 use crate::geometry::VertexId;
 use glam::DVec3;
 use rayon::prelude::*;
-use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// The twelve even permutations, as the old place of each new place: first place, then which of the other three is second.
@@ -34,8 +36,8 @@ const EVEN: [[u8; 4]; 12] = [
     [3, 1, 0, 2],
 ];
 
-/// In place of a rotation: the slot holds no tetrahedron.
-const DEAD: u8 = u8::MAX;
+/// In place of [`PLACES`]: the slot holds no tetrahedron.
+const DEAD: u8 = 0;
 
 /// Buckets up to this size are ordered by counting smaller elements, which needs no branches.
 const SMALL: usize = 24;
@@ -52,37 +54,27 @@ pub(super) fn canonical(
     neighbours: Vec<[u32; 4]>,
 ) -> Triangulation {
     let slots = vertices.len();
-    let mut rotations: Vec<u8> = zeros(slots);
-    vertices
-        .par_chunks_mut(CHUNK)
-        .zip(rotations.par_chunks_mut(CHUNK))
-        .for_each(|(tets, rotations)| {
-            for (v, r) in tets.iter_mut().zip(rotations) {
-                (*v, *r) = renamed(*v, &order);
-            }
-        });
-
-    drop(order);
-    let mut tasks = tasks(points.len());
-    tasks.par_iter_mut().for_each(|task| task.count(&vertices));
-    let total: usize = tasks.iter().map(Task::size).sum();
-    let finite: usize = tasks.iter().filter(|t| !t.ghosts).map(Task::size).sum();
+    let Renamed {
+        places,
+        mut ends,
+        ghosts,
+    } = rename(&mut vertices, order);
+    let finite = ends.last().map_or(0, |&end| end as usize);
+    let total = finite + ghosts.len();
+    // Where buckets begin; dealing moves each beginning to its end.
+    ends.rotate_right(1);
+    ends[0] = 0;
     let mut records = vec![[0u32; 4]; total];
     let id: Vec<AtomicU32> = zeros::<u32>(slots).into_iter().map(AtomicU32::new).collect();
-    let mut parts = Vec::with_capacity(tasks.len());
-    let (mut rest, mut start) = (records.as_mut_slice(), 0);
-    for task in &mut tasks {
-        let (part, others) = rest.split_at_mut(task.size());
-        rest = others;
-        let size = task.size() as u32;
-        parts.push((task, part, start));
-        start += size;
-    }
-    parts.into_par_iter().for_each(|(task, part, start)| {
-        task.deal(&vertices, part);
-        task.sort(part, start, &id);
-    });
-    drop(tasks);
+    let (finite_records, ghost_records) = records.split_at_mut(finite);
+    buckets(&mut ends, finite_records)
+        .into_par_iter()
+        .for_each(|mut buckets| {
+            buckets.deal(&vertices);
+            buckets.sort(&id);
+        });
+    number_ghosts(&vertices, &ghosts, ghost_records, finite as u32, &id);
+    drop((ends, ghosts));
 
     // The old vertices are done with; their room serves the new neighbours.
     let out: Vec<[AtomicU32; 4]> = vertices
@@ -91,23 +83,22 @@ pub(super) fn canonical(
         .collect();
     (
         neighbours.par_chunks(CHUNK),
-        rotations.par_chunks(CHUNK),
+        places.par_chunks(CHUNK),
         id.par_chunks(CHUNK),
     )
         .into_par_iter()
         .for_each(|(neighbours, own, new)| {
             let tets = neighbours.iter().zip(own).zip(new);
-            for ((across, &r), new) in tets.filter(|((_, r), _)| **r != DEAD) {
-                let place = &out[new.load(Relaxed) as usize];
-                for (k, word) in EVEN[r as usize].iter().zip(place) {
-                    let packed = across[*k as usize];
-                    let other = (packed >> 2) as usize;
-                    let facet = NEW_PLACE[rotations[other] as usize % 12][(packed & 3) as usize];
-                    word.store(4 * id[other].load(Relaxed) + u32::from(facet), Relaxed);
+            for ((across, &own), new) in tets.filter(|((_, own), _)| **own != DEAD) {
+                let words = &out[new.load(Relaxed) as usize];
+                for k in 0..4 {
+                    let other = (across[k] >> 2) as usize;
+                    let facet = place(places[other], across[k] & 3);
+                    words[place(own, k as u32) as usize].store(4 * id[other].load(Relaxed) + facet, Relaxed);
                 }
             }
         });
-    drop((neighbours, id, rotations));
+    drop((neighbours, id, places));
     let mut neighbours: Vec<[u32; 4]> = out
         .into_iter()
         .map(|words| words.map(AtomicU32::into_inner))
@@ -143,6 +134,62 @@ pub(super) fn zeros<T: Clone + Default>(len: usize) -> Vec<T> {
     v
 }
 
+/// What step 1 gives beside the renamed vertices.
+struct Renamed {
+    /// The rotation of every tetrahedron, as in [`PLACES`].
+    places: Vec<u8>,
+    /// For each vertex the number of finite tetrahedra whose smallest vertex it or a smaller one is.
+    ends: Vec<u32>,
+    /// Slots that hold ghosts, in order.
+    ghosts: Vec<u32>,
+}
+
+/// Step 1 for all tetrahedra.
+fn rename(vertices: &mut [[u32; 4]], order: Vec<u32>) -> Renamed {
+    let mut places: Vec<u8> = zeros(vertices.len());
+    let counts: Vec<AtomicU32> = zeros::<u32>(order.len())
+        .into_iter()
+        .map(AtomicU32::new)
+        .collect();
+    let alone = rayon::current_num_threads() == 1;
+    let count = |vertex: u32| {
+        let count = &counts[vertex as usize];
+        if alone {
+            count.store(count.load(Relaxed) + 1, Relaxed);
+        } else {
+            count.fetch_add(1, Relaxed);
+        }
+    };
+    let ghosts: Vec<Vec<u32>> = (vertices.par_chunks_mut(CHUNK), places.par_chunks_mut(CHUNK))
+        .into_par_iter()
+        .enumerate()
+        .map(|(chunk, (tets, places))| {
+            let mut ghosts = Vec::new();
+            let first = (chunk * CHUNK) as u32;
+            for ((v, places), slot) in tets.iter_mut().zip(places).zip(first..) {
+                (*v, *places) = renamed(*v, &order);
+                if v[3] != INF {
+                    count(v[0]);
+                } else if v[0] != INF {
+                    ghosts.push(slot);
+                }
+            }
+            ghosts
+        })
+        .collect();
+    let mut ends: Vec<u32> = counts.into_iter().map(AtomicU32::into_inner).collect();
+    let mut sum = 0;
+    for end in &mut ends {
+        sum += *end;
+        *end = sum;
+    }
+    Renamed {
+        places,
+        ends,
+        ghosts: ghosts.concat(),
+    }
+}
+
 /// Step 1 for one tetrahedron: its vertices in canonical order and the rotation that brought them there.
 #[inline(always)]
 fn renamed(v: [u32; 4], order: &[u32]) -> ([u32; 4], u8) {
@@ -151,100 +198,114 @@ fn renamed(v: [u32; 4], order: &[u32]) -> ([u32; 4], u8) {
     }
     let rename = |i: u32| if i == INF { INF } else { order[i as usize] };
     let v = [rename(v[0]), rename(v[1]), rename(v[2]), rename(v[3])];
-    let r = rotation(v);
-    let [a, b, c, d] = EVEN[r as usize];
-    ([v[a as usize], v[b as usize], v[c as usize], v[d as usize]], r)
+    let r = rotation(v) as usize;
+    let [a, b, c, d] = EVEN[r];
+    (
+        [v[a as usize], v[b as usize], v[c as usize], v[d as usize]],
+        PLACES[r],
+    )
 }
 
-/// Step 2 for the tetrahedra, finite or ghosts, whose smallest vertices are in a range.
-struct Task {
-    ghosts: bool,
-    range: Range<u32>,
-    /// Ends of the buckets, one a vertex, after [`Self::count`] where they begin.
-    ends: Vec<u32>,
-    size: u32,
+/// Step 2 for the finite tetrahedra whose smallest vertices are in a range.
+struct Buckets<'a> {
+    /// The first of these vertices.
+    first: u32,
+    /// Number of the first of these tetrahedra.
+    start: u32,
+    /// Where each vertex' bucket begins, after [`Self::deal`] where it ends.
+    ends: &'a mut [u32],
+    /// The buckets.
+    records: &'a mut [[u32; 4]],
 }
 
-/// Ranges of about equal size, as many as there are threads, first for finite tetrahedra, then for ghosts.
-fn tasks(points: usize) -> Vec<Task> {
-    let count = rayon::current_num_threads().min(points);
-    let bound = |i: usize| (points * i / count) as u32;
-    [false, true]
-        .into_iter()
-        .flat_map(|ghosts| (0..count).map(move |i| (ghosts, bound(i)..bound(i + 1))))
-        .map(|(ghosts, range)| Task {
-            ghosts,
-            range,
-            ends: Vec::new(),
-            size: 0,
-        })
-        .collect()
+/// Ranges with about equally many tetrahedra, one a thread; `begins` is where buckets begin among `records`.
+fn buckets<'a>(mut begins: &'a mut [u32], mut records: &'a mut [[u32; 4]]) -> Vec<Buckets<'a>> {
+    let threads = rayon::current_num_threads();
+    let all = records.len();
+    let mut out = Vec::with_capacity(threads);
+    let (mut first, mut start) = (0, 0);
+    for i in 1..=threads {
+        let last = all * i / threads;
+        let vertices = begins.partition_point(|&b| (b as usize) < last);
+        let vertices = if i == threads { begins.len() } else { vertices };
+        let (ends, others) = begins.split_at_mut(vertices);
+        let size = others.first().map_or(all, |&b| b as usize) - start;
+        let (part, rest) = records.split_at_mut(size);
+        out.push(Buckets {
+            first,
+            start: start as u32,
+            ends,
+            records: part,
+        });
+        (begins, records) = (others, rest);
+        first += vertices as u32;
+        start += size;
+    }
+    out
 }
 
-impl Task {
-    fn size(&self) -> usize {
-        self.size as usize
-    }
-
-    /// The bucket of a tetrahedron, if it is one of this task's.
-    #[inline(always)]
-    fn bucket(&self, v: [u32; 4]) -> Option<usize> {
-        let place = v[0].wrapping_sub(self.range.start);
-        ((place < self.range.len() as u32) & ((v[3] == INF) == self.ghosts)).then_some(place as usize)
-    }
-
-    /// Counts the tetrahedra of every bucket.
-    fn count(&mut self, vertices: &[[u32; 4]]) {
-        let mut ends = zeros::<u32>(self.range.len());
-        for &v in vertices {
-            if let Some(bucket) = self.bucket(v) {
-                ends[bucket] += 1;
-            }
-        }
-        for end in &mut ends {
-            let begin = self.size;
-            self.size += *end;
-            *end = begin;
-        }
-        self.ends = ends;
-    }
-
+impl Buckets<'_> {
     /// Deals records into buckets: the three vertices after the first, and the old number.
-    fn deal(&mut self, vertices: &[[u32; 4]], part: &mut [[u32; 4]]) {
+    fn deal(&mut self, vertices: &[[u32; 4]]) {
         for (old, &v) in (0u32..).zip(vertices) {
-            if let Some(bucket) = self.bucket(v) {
-                let end = &mut self.ends[bucket];
-                part[*end as usize] = [v[1], v[2], v[3], old];
+            let bucket = v[0].wrapping_sub(self.first) as usize;
+            if v[3] != INF
+                && let Some(end) = self.ends.get_mut(bucket)
+            {
+                self.records[(*end - self.start) as usize] = [v[1], v[2], v[3], old];
                 *end += 1;
             }
         }
     }
 
-    /// Sorts the buckets, notes the new number of each tetrahedron and completes the records to four vertices; `start` is the
-    /// number of the first.
-    fn sort(&mut self, part: &mut [[u32; 4]], start: u32, id: &[AtomicU32]) {
+    /// Sorts the buckets, notes the new number of each tetrahedron and completes the records to four vertices.
+    fn sort(&mut self, id: &[AtomicU32]) {
         let mut begin = 0;
-        for (first, &end) in self.range.clone().zip(&self.ends) {
-            let run = &mut part[begin..end as usize];
+        for (first, &end) in (self.first..).zip(&*self.ends) {
+            let end = (end - self.start) as usize;
+            let run = &mut self.records[begin..end];
             sort_run(run);
-            for (new, record) in (start + begin as u32..).zip(run) {
+            for (new, record) in (self.start + begin as u32..).zip(run) {
                 let [x, y, z, old] = *record;
                 id[old as usize].store(new, Relaxed);
                 *record = [first, x, y, z];
             }
-            begin = end as usize;
+            begin = end;
         }
-        self.ends = Vec::new();
     }
+}
+
+/// Step 2 for the ghosts in the given slots, few unless the cloud is convex; numbers begin at `start`.
+fn number_ghosts(
+    vertices: &[[u32; 4]],
+    ghosts: &[u32],
+    records: &mut [[u32; 4]],
+    start: u32,
+    id: &[AtomicU32],
+) {
+    records.par_iter_mut().zip(ghosts).for_each(|(record, &slot)| {
+        let [a, b, c, _] = vertices[slot as usize];
+        *record = [a, b, c, slot];
+    });
+    records.par_sort_unstable_by_key(key);
+    records
+        .par_iter_mut()
+        .zip(start..start + ghosts.len() as u32)
+        .for_each(|(record, new)| {
+            id[record[3] as usize].store(new, Relaxed);
+            record[3] = INF;
+        });
+}
+
+/// A record as one number: three vertices, then the old name, which never decides.
+#[inline(always)]
+fn key(&[x, y, z, old]: &[u32; 4]) -> u128 {
+    u128::from(x) << 96 | u128::from(y) << 64 | u128::from(z) << 32 | u128::from(old)
 }
 
 /// Sorts one bucket by vertices.
 #[inline(always)]
 fn sort_run(run: &mut [[u32; 4]]) {
-    // As one number each: three vertices, then the old name, which never decides.
-    let key = |&[x, y, z, old]: &[u32; 4]| {
-        u128::from(x) << 96 | u128::from(y) << 64 | u128::from(z) << 32 | u128::from(old)
-    };
     let n = run.len();
     if n > SMALL {
         run.sort_unstable_by_key(key);
@@ -267,20 +328,26 @@ fn sort_run(run: &mut [[u32; 4]]) {
     }
 }
 
-/// The new place of each old place: inverses of [`EVEN`].
-const NEW_PLACE: [[u8; 4]; 12] = {
-    let mut inverse = [[0; 4]; 12];
+/// The new place of each old place, two bits each: inverses of [`EVEN`]. None is zero.
+const PLACES: [u8; 12] = {
+    let mut places = [0; 12];
     let mut r = 0;
     while r < 12 {
         let mut k = 0;
         while k < 4 {
-            inverse[r][EVEN[r][k] as usize] = k as u8;
+            places[r] |= (k as u8) << (2 * EVEN[r][k]);
             k += 1;
         }
         r += 1;
     }
-    inverse
+    places
 };
+
+/// The new place of an old one, by an entry of [`PLACES`].
+#[inline(always)]
+fn place(places: u8, old: u32) -> u32 {
+    u32::from(places) >> (2 * old) & 3
+}
 
 /// Which of [`EVEN`] brings two old places, `4 * first + second`, to the front.
 const TO_FRONT: [u8; 16] = {

@@ -77,6 +77,9 @@ impl Frame {
     /// The frame of finite points, or the error that says which of them spans too wide a range. Clouds of ordinary
     /// magnitude (coordinates and their last bits between `2^BOTTOM` and `2^TOP`) are left as they are.
     pub fn of(points: &[DVec3]) -> Result<Self, DelaunayError> {
+        if points.iter().all(|p| is_ordinary(*p)) {
+            return Ok(Self { exponent: 0 });
+        }
         let [lo, hi] = exponents(points);
         if hi < lo || (lo >= BOTTOM && hi <= TOP) {
             return Ok(Self { exponent: 0 });
@@ -123,10 +126,23 @@ impl Frame {
     }
 }
 
+/// Whether the coordinates of a point are finite and need no frame, whatever their last bits.
+#[inline(always)]
+fn is_ordinary(p: DVec3) -> bool {
+    const SMALLEST: f64 = power(BOTTOM + 52);
+    const LARGEST: f64 = power(TOP);
+    let ordinary = |v: f64| (v == 0.0) | ((v.abs() >= SMALLEST) & (v.abs() < LARGEST));
+    ordinary(p.x) & ordinary(p.y) & ordinary(p.z)
+}
+
+/// `2^e` for a normal number.
+const fn power(e: i32) -> f64 {
+    f64::from_bits(((e + 1023) as u64) << 52)
+}
+
 /// `p * 2^e`, in two steps so that the factors stay in range.
 fn scale(p: DVec3, e: i32) -> DVec3 {
     let half = e / 2;
-    let power = |e: i32| f64::powi(2.0, e);
     // |e| <= 1074 + TOP, so both halves are normal numbers.
     p * power(half) * power(e - half)
 }
@@ -251,6 +267,9 @@ fn check(points: &[DVec3]) -> Result<(), DelaunayError> {
             count: points.len(),
             limit: MAX_POINTS,
         });
+    }
+    if points.iter().all(|p| is_ordinary(*p)) {
+        return Ok(());
     }
     let bad = |p: &DVec3| p.to_array().into_iter().find(|v| !v.is_finite());
     match points

@@ -150,6 +150,24 @@ const STEPS: [[u8; 8]; 24] = {
     steps
 };
 
+/// Two steps of the curve at once: places of six bits and, above them, the state within.
+const TWO_STEPS: [[u16; 64]; 24] = {
+    let mut steps = [[0; 64]; 24];
+    let mut state = 0;
+    while state < 24 {
+        let mut octants = 0;
+        while octants < 64 {
+            let outer = STEPS[state][octants >> 3];
+            let inner = STEPS[(outer >> 3) as usize][octants & 7];
+            let place = (outer as u16 & 7) << 3 | inner as u16 & 7;
+            steps[state][octants] = (inner as u16 >> 3) << 6 | place;
+            octants += 1;
+        }
+        state += 1;
+    }
+    steps
+};
+
 /// Three bits turned to the right.
 const fn rotate_right(v: u32, by: u32) -> u32 {
     let by = by % 3;
@@ -167,10 +185,18 @@ fn hilbert(cell: [u32; 3], bits: u32) -> u64 {
     let octants = spread(cell[0]) | spread(cell[1]) << 1 | spread(cell[2]) << 2;
     let mut state = 0;
     let mut position = 0;
-    for level in (0..bits).rev() {
-        let step = STEPS[state as usize % 24][(octants >> (3 * level)) as usize & 7];
-        position = position << 3 | u64::from(step & 7);
-        state = step >> 3;
+    let mut level = bits;
+    if level % 2 == 1 {
+        level -= 1;
+        let step = STEPS[0][(octants >> (3 * level)) as usize & 7];
+        position = u64::from(step & 7);
+        state = usize::from(step >> 3);
+    }
+    while level > 0 {
+        level -= 2;
+        let step = TWO_STEPS[state % 24][(octants >> (3 * level)) as usize & 63];
+        position = position << 6 | u64::from(step & 63);
+        state = usize::from(step >> 6);
     }
     position
 }
