@@ -138,6 +138,18 @@ fn views_are_nested_and_keep_what_there_is() {
         last = now;
     }
     assert_eq!((last[0], last[1]), (1, 0));
+    // The levels, which the plot and the slider of the report speak from, count what the views hold.
+    let levels = s.levels();
+    assert_eq!(levels[0].tolerance_mm, s.tolerance_mm);
+    for pair in levels.windows(2) {
+        let (from, to) = (pair[0].tolerance_mm, pair[1].tolerance_mm);
+        for t in [from + 1e-9 * s.diagonal_mm, 0.5 * (from + to), to] {
+            let v = counts(&s.view(t.min(to)));
+            let level =
+                [pair[1].sheets, pair[1].axial_curves, pair[1].wires, pair[1].nodes].map(|n| n as usize);
+            assert_eq!([v[0], v[1], v[3], v[4]], level, "at {t} mm");
+        }
+    }
     let text = serde_json::to_string(&s).expect("finite numbers");
     let back: CoarseScaffold = serde_json::from_str(&text).expect("the same fields");
     assert_eq!(back.curves, s.curves);

@@ -8,7 +8,9 @@ use medial_scaffold::fine_scaffold::{
 use medial_scaffold::geometry::TriangleMesh;
 use medial_scaffold::input::{Geometry, ReadSettings, read_shape};
 use medial_scaffold::regularise::{RegulariseSettings, Regularised, regularise};
-use medial_scaffold::segregation::{KnownSurfaceSettings, segregate_known_refined};
+use medial_scaffold::segregation::{
+    KnownSurfaceSettings, SegregationSettings, segregate_cloud, segregate_known_refined,
+};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -58,6 +60,39 @@ pub fn run(
         solid: solid_betti(&refined.triangulation, segregation, Side::Interior)
             .expect("labels of this triangulation"),
         known: mesh_betti(surface),
+        fine,
+        regularised,
+        coarse,
+        seconds_segregate: (t1 - t0).as_secs_f64(),
+        seconds_fine: (t2 - t1).as_secs_f64(),
+        seconds_regularise: (t3 - t2).as_secs_f64(),
+        seconds_coarse: (t4 - t3).as_secs_f64(),
+    })
+}
+
+/// Runs all stages on a raw cloud: segregated by its points alone, noise removed as the pipeline does it. `known` are the Betti
+/// numbers it should have.
+pub fn run_cloud(
+    points: &[DVec3],
+    known: Option<Betti>,
+    settings: &RegulariseSettings,
+) -> Result<Run, Box<dyn Error>> {
+    let t0 = Instant::now();
+    let cloud = segregate_cloud(points, &SegregationSettings::default())?;
+    let t1 = Instant::now();
+    let fine = fine_scaffold(
+        &cloud.triangulation,
+        &cloud.segregation,
+        &FineScaffoldSettings::default(),
+    )?;
+    let t2 = Instant::now();
+    let regularised = regularise(&fine, settings)?;
+    let t3 = Instant::now();
+    let coarse = coarse_scaffold(&fine, &regularised, &CoarseScaffoldSettings::default());
+    let t4 = Instant::now();
+    Ok(Run {
+        solid: solid_betti(&cloud.triangulation, &cloud.segregation, Side::Interior)?,
+        known,
         fine,
         regularised,
         coarse,

@@ -61,8 +61,11 @@ pub fn coarse_scaffold(
     let sheets_of_chain: Vec<Vec<SheetId>> = chains
         .iter()
         .map(|chain| {
-            network
-                .facets(chain.edges[0])
+            let mut facets: Vec<u32> = network.facets(network.summit(chain)).collect();
+            let erosion = |f: u32| regularised.erosion_mm[f as usize];
+            facets.sort_by(|&a, &b| erosion(b).total_cmp(&erosion(a)).then(a.cmp(&b)));
+            facets
+                .into_iter()
                 .map(|f| SheetId(sheet_of_facet[f as usize]))
                 .collect()
         })

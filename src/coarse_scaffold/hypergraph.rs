@@ -151,7 +151,8 @@ pub struct Curve {
     pub nodes: Vec<NodeId>,
     /// Whether the curve is closed.
     pub closed: bool,
-    /// Incident sheets, one entry for each time a sheet meets the curve.
+    /// Incident sheets, one entry for each time a sheet meets the curve; of an axial curve in order of erosion thickness at its most
+    /// persistent place, so that the last is the one that goes first.
     pub sheets: Vec<SheetId>,
     /// Length, mm.
     pub length: f64,

@@ -6,7 +6,7 @@
 //! * [`build`]: [`coarse_scaffold`], the front function; `network` finds nodes, curves and sheets, `contract` makes
 //!   nodes of what is small, `hide` takes out what is below the cut, `ribs` fits the borders, `attributes`
 //!   measures, `generators` maps the surface to them, `natural` finds gaps in the persistences;
-//! * [`view`]: the graph at a coarser tolerance.
+//! * [`view`]: the graph at a coarser tolerance; [`levels`]: how many elements each of them has.
 
 mod attributes;
 pub mod build;
@@ -14,6 +14,7 @@ mod contract;
 mod generators;
 mod hide;
 pub mod hypergraph;
+pub mod levels;
 mod natural;
 mod network;
 pub mod ribs;
@@ -25,4 +26,5 @@ pub use hypergraph::{
     CoarseScaffold, Curve, CurveKind, FineLinks, Host, MedialPoint, NaturalTolerance, Node, NodeKind, Sheet,
     SheetMesh, SheetMoments,
 };
+pub use levels::Level;
 pub use settings::CoarseScaffoldSettings;

@@ -101,6 +101,18 @@ impl<'a> Network<'a> {
             .fold(f64::INFINITY, f64::min)
     }
 
+    /// The edge of largest third-highest erosion thickness of a chain, the first of equals.
+    pub fn summit(&self, chain: &Chain) -> u32 {
+        let highest = |a: u32, &b: &u32| {
+            if self.third_erosion(b) > self.third_erosion(a) {
+                b
+            } else {
+                a
+            }
+        };
+        chain.edges.iter().fold(chain.edges[0], highest)
+    }
+
     /// Alive facets at an edge.
     pub fn facets(&self, e: u32) -> impl Iterator<Item = u32> + '_ {
         let alive = |f: &u32| self.regularised.alive.facets[*f as usize];

@@ -4,8 +4,9 @@
 //! again, so views are cheap, and nested: what a coarse view shows, every finer one shows too.
 //!
 //! 1. sheets below the tolerance go; of a part of the scaffold that would vanish, the most persistent sheet stays;
-//! 2. axial curves, wires and seams below it go; sheets on both sides of a curve that went become one, and what a sheet
-//!    that went stood for (volume, generators) falls to the sheet it hung on;
+//! 2. axial curves, wires and seams below it go; of the three sheets at an axial curve that went, the two of highest erosion thickness become
+//!    one and the third is one with them only where nothing else holds it; what a sheet that went stood for (volume, generators)
+//!    falls to the sheet it hung on by its most persistent curve;
 //! 3. nodes that no curve ends at go; where just two curves of one kind are left, they become one.
 //!
 //! Cost: `O(elements log elements)`.
@@ -34,12 +35,7 @@ impl CoarseScaffold {
                 _ => c.persistence >= tolerance_mm,
             })
             .collect();
-        let mut merged = DisjointSets::new(self.sheets.len());
-        for (c, _) in self.curves.iter().zip(&keep_curve).filter(|(_, k)| !**k) {
-            for pair in c.sheets.windows(2) {
-                merged.union(pair[0].0, pair[1].0);
-            }
-        }
+        let mut merged = self.joined(&keep_sheet, &keep_curve);
         let (mut sheets, sheet_of) = self.merged_sheets(&keep_sheet, &mut merged);
         let mut curves: Vec<Curve> = self
             .curves
@@ -69,6 +65,46 @@ impl CoarseScaffold {
             transforms: self.transforms.clone(),
             fine: FineLinks::default(),
         }
+    }
+
+    /// The sheets that become one when curves go: the two sides of a curve that stay when the third is trimmed away from it. What a
+    /// sheet that goes stood for falls to the sheet it hung on by its most persistent curve; so does a sheet that would
+    /// hang on nothing.
+    fn joined(&self, keep_sheet: &[bool], keep_curve: &[bool]) -> DisjointSets {
+        let mut merged = DisjointSets::new(self.sheets.len());
+        let mut gone: Vec<&Curve> = self
+            .curves
+            .iter()
+            .filter(|c| !keep_curve[c.id.index()] && c.sheets.len() > 1)
+            .collect();
+        gone.sort_by(|a, b| b.persistence.total_cmp(&a.persistence).then(a.id.cmp(&b.id)));
+        for c in &gone {
+            if c.sheets[..2].iter().all(|s| keep_sheet[s.index()]) {
+                merged.union(c.sheets[0].0, c.sheets[1].0);
+            }
+        }
+        let mut hangs = vec![false; self.sheets.len()];
+        for c in self.curves.iter().filter(|c| keep_curve[c.id.index()]) {
+            let first = c.sheets.first().map(|s| merged.find(s.0));
+            if c.sheets.iter().any(|s| Some(merged.find(s.0)) != first) {
+                for s in &c.sheets {
+                    hangs[merged.find(s.0) as usize] = true;
+                }
+            }
+        }
+        for c in gone {
+            let first = c.sheets[0].0;
+            for s in &c.sheets[1..] {
+                let (a, b) = (merged.find(first), merged.find(s.0));
+                if a != b && !(hangs[a as usize] && hangs[b as usize]) {
+                    let either = hangs[a as usize] || hangs[b as usize];
+                    merged.union(a, b);
+                    let root = merged.find(a) as usize;
+                    hangs[root] = either;
+                }
+            }
+        }
+        merged
     }
 
     /// Sheets that stay: those persistent enough, and the most persistent one of each part without any.

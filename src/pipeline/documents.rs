@@ -1,6 +1,6 @@
 //! The JSON documents the commands write. Field names are a contract: added freely, never renamed.
 
-use crate::coarse_scaffold::{CoarseScaffold, Curve, CurveKind, Node, Sheet};
+use crate::coarse_scaffold::{CoarseScaffold, Curve, CurveKind, Level, Node, Sheet};
 use crate::fine_scaffold::{Betti, Side};
 use crate::full_scaffold::CriticalCounts;
 use crate::geometry::TriangleMesh;
@@ -47,6 +47,8 @@ pub struct ScaffoldDocument<'a> {
     pub curves: &'a [Curve],
     /// Sheets.
     pub sheets: &'a [Sheet],
+    /// What the graph of each coarser tolerance holds.
+    pub levels: Vec<Level>,
     /// What was done that a user may want to know.
     pub notes: &'a [String],
     /// What a user must know.

@@ -245,6 +245,7 @@ impl ScaffoldRun {
             nodes: &self.coarse.nodes,
             curves: &self.coarse.curves,
             sheets: &self.coarse.sheets,
+            levels: self.coarse.levels(),
             notes: &self.notes,
             warnings: &self.warnings,
         }

@@ -288,6 +288,8 @@ pub struct Report {
     pub view: Option<View>,
     /// Elements of lower persistence are hidden at first, mm.
     pub tolerance_mm: Option<f64>,
+    /// `levels` of `scaffold.json`: what the graph of each tolerance holds, said beside the slider; null when there is none.
+    pub levels: Value,
     /// Lets the viewer show layers of the shape `source` where they were before alignment.
     pub T_target_source: Option<Rigid>,
     /// Name of the surface quantity shown at first; none shows plain surfaces.
@@ -373,6 +375,7 @@ impl Report {
         json!({
             "view": view,
             "tolerance_mm": self.tolerance_mm,
+            "levels": self.levels,
             "T_target_source": self.T_target_source.map(|t| t.to_rows()),
             "surface_colours": self.surface_colours,
             "scales": {

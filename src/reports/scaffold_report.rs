@@ -26,6 +26,7 @@ pub fn scaffold_report(
         subtitle: subtitle(scaffold),
         scene,
         tolerance_mm: Some(least_shown(scaffold, tolerance)),
+        levels: at(scaffold, "levels").cloned().unwrap_or_default(),
         result: scaffold.clone(),
         run: run.clone(),
         ..Report::default()
@@ -122,18 +123,20 @@ fn notes(report: &mut Report, s: &Value, run: &Value) {
     }
 }
 
-/// Number of elements whose persistence is at least x, as a step line over the persistences.
-fn survivors(name: &str, colour: &str, persistences: &mut [f64], from: f64) -> Series {
-    persistences.sort_by(f64::total_cmp);
-    let n = persistences.len();
-    let mut points = vec![[from, n as f64]];
-    for (i, p) in persistences.iter().enumerate() {
-        points.push([p.max(from), (n - i - 1) as f64]);
+/// One count of the levels as a step line: the value before each tolerance is that of the graph up to it.
+fn steps(s: &Value, name: &str, colour: &str, counts: &[&str], from: f64) -> Series {
+    let mut points: Vec<[f64; 2]> = Vec::new();
+    let mut start = from;
+    for level in items(s, "levels") {
+        let count: f64 = counts.iter().filter_map(|c| number(level, c)).sum();
+        points.push([start, count]);
+        start = number(level, "tolerance_mm").unwrap_or(start).max(from);
+        points.push([start, count]);
     }
     Series {
         name: name.to_owned(),
         colour: colour.to_owned(),
-        style: SeriesStyle::Step,
+        style: SeriesStyle::Line,
         points,
     }
 }
@@ -154,28 +157,30 @@ fn persistences(s: &Value, list: &str, kinds: &[&str]) -> Vec<f64> {
 
 fn simplification(s: &Value, tolerance: f64) -> Section {
     let mut section = Section::new("What each tolerance keeps");
-    let mut sheets = persistences(s, "sheets", &[]);
-    let mut axial = persistences(s, "curves", &["axial", "wire"]);
-    if sheets.is_empty() && axial.is_empty() {
+    let sheets = persistences(s, "sheets", &[]);
+    let curves = persistences(s, "curves", &["axial", "wire"]);
+    if sheets.is_empty() && curves.is_empty() {
         return section;
     }
     section.paragraphs.push(
-        "Every sheet and curve carries its persistence: how much of the shape must be given up before it goes. \
+        "Every sheet and curve carries its persistence: how much of the shape must be given up before it goes. Where a curve goes, \
+         the sheets on its two sides become one, and what is left of the curves at its ends may become one. \
          A long flat step is a stable level of detail; the slider beside the picture hides what lies below a level."
             .to_owned(),
     );
     let from = least_shown(s, tolerance);
     let mut series = Vec::new();
     if !sheets.is_empty() {
-        series.push(survivors("sheets", "#3a86c8", &mut sheets, from));
+        series.push(steps(s, "sheets", "#3a86c8", &["sheets"], from));
     }
-    if !axial.is_empty() {
-        series.push(survivors("axial curves and wires", "#d61f29", &mut axial, from));
+    if !curves.is_empty() {
+        let both = ["axial_curves", "wires"];
+        series.push(steps(s, "axial curves and wires", "#d61f29", &both, from));
     }
     let chart = Chart {
-        title: "Elements kept at each tolerance".to_owned(),
+        title: "The graph at each tolerance".to_owned(),
         x_label: "tolerance [mm], logarithmic".to_owned(),
-        y_label: "elements kept".to_owned(),
+        y_label: "elements".to_owned(),
         series,
         markers: vec![Marker {
             x: tolerance,
@@ -183,10 +188,12 @@ fn simplification(s: &Value, tolerance: f64) -> Section {
         }],
         log_x: from > 0.0,
     };
-    section.plots.push(Plot {
-        svg: chart.svg(),
-        caption: "Sheets and curves that a tolerance keeps.".to_owned(),
-    });
+    if !items(s, "levels").is_empty() {
+        section.plots.push(Plot {
+            svg: chart.svg(),
+            caption: "Sheets and curves of the graph at each tolerance.".to_owned(),
+        });
+    }
     let shares: Vec<[f64; 2]> = items(s, "sheets")
         .iter()
         .filter_map(|x| Some([number(x, "id")?, 100.0 * number(x, "volume_share")?]))

@@ -295,7 +295,10 @@ class Viewer {
         const of = graded.filter((l) => l.kind === kind);
         return of.length ? `${of.filter((l) => l.persistence >= this.tolerance - 1e-12).length} of ${of.length} ${kind === 'axial' ? 'axial curves' : `${kind}s`}` : '';
       };
-      note.textContent = ['sheet', 'axial'].map(count).filter(Boolean).join(', ');
+      // Sheets become one where the curve between them goes, so the graph has fewer than the picture shows.
+      const level = (this.settings.levels ?? []).find((l) => l.tolerance_mm >= this.tolerance - 1e-12);
+      const graph = level ? `; as a graph ${level.sheets} sheets, ${level.axial_curves} axial curves` : '';
+      note.textContent = ['sheet', 'axial'].map(count).filter(Boolean).join(', ') + graph;
     };
     const s = slider('Hide below persistence', low, top, (top - low) / 400 || 1e-6, this.tolerance,
       (v) => `${number(v)} mm`, (v) => { this.tolerance = v; tell(); this.apply(); });
