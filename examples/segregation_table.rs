@@ -4,6 +4,7 @@
 //! cargo run --release --example segregation_table -- --n 10000 --seeds 3 --noise 0,0.05,0.1,0.25,0.5,0.75
 //!     [--shapes torus,bunny] [--density 20] [--outliers 0.05] [--verbose] [--rows] [--no-second] [--closed] [--time]
 //! cargo run --release --example segregation_table -- --n 10000 --all-meshes [--verbose]
+//! cargo run --release --example segregation_table -- --n 4000 --seeds 2 --holes 0,0.04,0.06,0.1 [--noise 0,0.1]
 //! ```
 //! "Right": closed, no open or non-manifold edge or vertex, the true Euler number and number of components. Distances are
 //! in mean spacings `sqrt(area / n)` against the true mesh, both ways. `--time` prints every run's processor seconds (all
@@ -29,6 +30,7 @@ struct Options {
     verbose: bool,
     rows: bool,
     time: bool,
+    holes: Vec<f64>,
     settings: SegregationSettings,
 }
 
@@ -40,6 +42,7 @@ struct Row {
     hausdorff: f64,
     mean: f64,
     volume_error: f64,
+    inscription_error: f64,
     off: f64,
     open_edges: usize,
     bad: usize,
@@ -52,13 +55,16 @@ fn main() {
     if std::env::args().any(|a| a == "--all-meshes") {
         return all_meshes(&options);
     }
+    if std::env::args().any(|a| a == "--holes") {
+        return holes(&options);
+    }
     println!(
         "n {} seeds {} density 1:{} outliers {}",
         options.n, options.seeds, options.density, options.outliers
     );
     if !options.time {
         println!(
-            "noise  right right+near runs | hausdorff med p95 max | mean | vol % med max | off % max | open bad | noise read min max | flagged wrong, flagged right | s med"
+            "noise  right right+near runs | hausdorff med p95 max | mean | vol % med max | signed, inscribed med | off % max | open bad | noise read min max | flagged wrong, flagged right | s med"
         );
     }
     let truths: Vec<(String, TriangleMesh)> = all_shapes()
@@ -154,6 +160,10 @@ fn parse() -> Options {
         outliers: number("--outliers", 0.0),
         verbose: args.iter().any(|a| a == "--verbose"),
         rows: args.iter().any(|a| a == "--rows"),
+        holes: list("--holes", "")
+            .iter()
+            .filter_map(|s| s.parse().ok())
+            .collect(),
         time: args.iter().any(|a| a == "--time"),
         settings,
     }
@@ -176,7 +186,7 @@ fn run(name: &str, truth: &TriangleMesh, noise: f64, seed: u64, options: &Option
     if options.rows || (options.verbose && !(row.right && row.near)) {
         let r = &result.report;
         println!(
-            "  {name} seed {seed} noise {noise}: {} euler {} comps {} H {:.2} mean {:.3} vol {:+.3} % off {:.3} % unsup {:.4} pinched {} flips {} adopted {} dropped {} it {} undone {} read {:.3} out {} kept {} opinions {:?} {:.2} s {}",
+            "  {name} seed {seed} noise {noise}: {} euler {} comps {} H {:.2} mean {:.3} vol {:+.3} % off {:.3} % unsup {:.4} pinched {} flips {} adopted {} dropped {} it {} undone {} read {:.3} out {} kept {} opinions {:?} {:?} {:.2} s {}",
             if row.right { "right" } else { "WRONG" },
             r.topology.euler,
             r.topology.components,
@@ -195,6 +205,7 @@ fn run(name: &str, truth: &TriangleMesh, noise: f64, seed: u64, options: &Option
             r.prepare.outliers,
             r.prepare.kept,
             r.second_opinions.iter().map(|o| o.euler).collect::<Vec<_>>(),
+            r.prepare.strength,
             seconds,
             r.doubts
                 .iter()
@@ -237,11 +248,49 @@ fn judge(result: &CloudSegregation, truth: &TriangleMesh, spacing: f64, noise: f
         hausdorff: v.hausdorff,
         mean: v.mean,
         volume_error: v.volume_error,
+        inscription_error: v.inscription_error,
         off: 100.0 * result.report.closing.off_share,
         open_edges: topology.boundary_edges,
         bad: topology.nonmanifold_edges + topology.nonmanifold_vertices,
         noise: result.report.prepare.noise_over_spacing,
         seconds,
+    }
+}
+
+/// Closed shapes with a hole of a share of their area: are they called open, and those without closed?
+fn holes(options: &Options) {
+    println!("hole share, noise: decided right of runs, with one rim, doubted");
+    let shapes: Vec<(String, TriangleMesh)> = all_shapes()
+        .into_iter()
+        .filter(|(name, _)| options.shapes.is_empty() || options.shapes.contains(name))
+        .collect();
+    for &share in &options.holes {
+        for &noise in &options.noise {
+            let (mut right, mut one_rim, mut doubted, mut runs) = (0, 0, 0, 0);
+            for (name, truth) in &shapes {
+                let spacing = (truth.area() * (1.0 - share) / options.n as f64).sqrt();
+                for seed in options.first_seed..options.first_seed + options.seeds {
+                    let mut points = support::sample_with_hole(truth, options.n, share, seed);
+                    support::shake(&mut points, noise * spacing, seed);
+                    let result = segregate_cloud(&points, &options.settings).expect("a finite cloud");
+                    let good = result.segregation.closed == (share == 0.0);
+                    runs += 1;
+                    right += usize::from(good);
+                    one_rim += usize::from(result.report.rims.len() == 1);
+                    doubted += usize::from(result.report.doubtful());
+                    if options.verbose && !good || options.rows {
+                        println!(
+                            "  {name} hole {share} noise {noise} seed {seed}: {}, {} rims {:?}, {}",
+                            if good { "right" } else { "WRONG" },
+                            result.report.rims.len(),
+                            result.report.rims.iter().map(|r| r.edges).collect::<Vec<_>>(),
+                            result.report.decision.reason
+                        );
+                    }
+                }
+            }
+            println!("{share:5.3} {noise:5.2}: {right} of {runs}, {one_rim}, {doubted}");
+        }
     }
 }
 
@@ -317,12 +366,14 @@ fn summary(noise: f64, rows: &[Row]) {
     let h = sorted(&|r| r.hausdorff);
     let m = sorted(&|r| r.mean);
     let v = sorted(&|r| r.volume_error.abs());
+    let w = sorted(&|r| r.volume_error);
+    let i = sorted(&|r| r.inscription_error);
     let o = sorted(&|r| r.off);
     let z = sorted(&|r| r.noise);
     let s = sorted(&|r| r.seconds);
     let wrong = |r: &&Row| !(r.right && r.near);
     println!(
-        "{noise:5.2} {:5} {:5} {:5} | {:.2} {:.2} {:.2} | {:.3} | {:.2} {:.2} | {:.2} | {} {} | {:.3} {:.3} | {} of {}, {} | {:.2}",
+        "{noise:5.2} {:5} {:5} {:5} | {:.2} {:.2} {:.2} | {:.3} | {:.2} {:.2} | {:+.2} {:+.2} | {:.2} | {} {} | {:.3} {:.3} | {} of {}, {} | {:.2}",
         rows.iter().filter(|r| r.right).count(),
         rows.iter().filter(|r| r.right && r.near).count(),
         rows.len(),
@@ -332,6 +383,8 @@ fn summary(noise: f64, rows: &[Row]) {
         at(&m, 0.5),
         at(&v, 0.5),
         at(&v, 1.0),
+        at(&w, 0.5),
+        at(&i, 0.5),
         at(&o, 1.0),
         rows.iter().map(|r| r.open_edges).sum::<usize>(),
         rows.iter().map(|r| r.bad).sum::<usize>(),

@@ -6,11 +6,12 @@ use glam::DVec3;
 use medial_scaffold::geometry::TriangleMesh;
 use medial_scaffold::input::repair::{RepairSettings, repair};
 use medial_scaffold::segregation::{
-    ClosedOrOpen, CloudSegregation, DoubtKind, Mending, SegregationSettings, mend, segregate_cloud,
+    ClosedOrOpen, CloudSegregation, Denoise, DoubtKind, Mending, SegregationSettings, Strength, mend,
+    segregate_cloud,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use segregation_support::{corrupted, data_shape, shapes, sphere, torus};
+use segregation_support::{corrupted, data_shape, sample_with_hole, shapes, sphere, torus};
 use std::f64::consts::TAU;
 
 /// A cloud of a surface given over the unit square, `n` points at random.
@@ -282,4 +283,53 @@ fn a_bone_with_a_hole_is_mended() {
         &mended.mesh.triangles[..faces.mesh.triangles.len()],
         &faces.mesh.triangles[..]
     );
+}
+
+#[test]
+fn a_hole_of_four_per_cent_is_seen_where_the_shape_is_curved() {
+    let slow = std::env::var_os("MEDIAL_SLOW").is_some();
+    let seeds = if slow { 10 } else { 2 };
+    let (mut right, mut runs) = (0, 0);
+    for (name, truth) in shapes() {
+        for seed in 1..=seeds {
+            for share in [0.0, 0.04] {
+                let r = cloud(&sample_with_hole(&truth, 4000, share, seed));
+                let good = r.segregation.closed == (share == 0.0);
+                if !good {
+                    println!("{name} hole {share} seed {seed}: {}", describe(&r));
+                }
+                right += usize::from(good);
+                runs += 1;
+            }
+        }
+    }
+    println!("{right} of {runs} decided right");
+    assert!(right as f64 >= 0.98 * runs as f64, "{right} of {runs}");
+}
+
+#[test]
+fn detail_that_reads_as_noise_is_not_smoothed_away() {
+    let (_, knot) = shapes().pop().expect("there are shapes");
+    let spacing = (knot.area() / 3000.0).sqrt();
+    // The tube is five spacings thick; smoothing for a quarter of a spacing of noise brings its sides together.
+    let r = cloud(&corrupted(&knot, 3000, 0.25 * spacing, 1.0, 0.0, 303));
+    assert!(
+        r.segregation.closed && r.report.topology.euler == 0 && !r.report.doubtful(),
+        "{}",
+        describe(&r)
+    );
+    assert_ne!(r.report.prepare.strength, Strength::Measured);
+    assert!(
+        r.segregation.warnings[0].contains("removing all the noise"),
+        "{:?}",
+        r.segregation.warnings
+    );
+    // Asked for, it is done in full all the same.
+    let always = SegregationSettings {
+        denoise: Denoise::Always,
+        ..Default::default()
+    };
+    let points = corrupted(&knot, 3000, 0.25 * spacing, 1.0, 0.0, 303);
+    let r = segregate_cloud(&points, &always).expect("a finite cloud");
+    assert_eq!(r.report.prepare.strength, Strength::Measured);
 }

@@ -16,6 +16,7 @@ use std::path::PathBuf;
 
 /// Arguments of `medial mesh`.
 #[derive(Debug, Args)]
+#[command(after_help = "Exit code 1: the mesh was made but is doubted; the warnings say why and where.")]
 pub struct MeshArgs {
     /// Point cloud; of a mesh the points are taken, with --repair its triangles too.
     cloud: PathBuf,
@@ -95,6 +96,15 @@ pub fn run(args: &MeshArgs, common: &Common) -> Result<Verdict, Failure> {
     };
     let progress = Progress::new(common.quiet);
     progress.stage("segregation");
+    if common.repair && matches!(shape.geometry, Geometry::Cloud(_)) {
+        warn_all(
+            common,
+            &[format!(
+                "{}: holds points only, so --repair has nothing to keep",
+                args.cloud.display()
+            )],
+        );
+    }
     if let (true, Geometry::Mesh(mesh)) = (common.repair, &shape.geometry) {
         let mended = mend(mesh, &settings)?;
         progress.finish();
@@ -136,13 +146,22 @@ fn deliver(
         print_json(&document)?;
     } else if !common.quiet {
         print_text(&format!(
-            "{name}: {} vertices, {} triangles, {} components, Euler number {}, {} open edges; {}\n",
+            "{name}: {} vertices, {} triangles, {}, Euler number {}, {} open edges; {}{}\n",
             document.vertices,
             document.triangles,
-            document.components,
+            if document.components == 1 {
+                "1 component".to_owned()
+            } else {
+                format!("{} components", document.components)
+            },
             document.euler,
             document.boundary_edges,
             report.decision.reason,
+            match (report.decision.closed, report.decision.by_user) {
+                (false, false) => "; --closed closes it all the same",
+                (true, false) if !report.filled_holes.is_empty() => "; --open leaves holes open",
+                _ => "",
+            },
         ))?;
     }
     Ok(if report.doubtful() {

@@ -9,6 +9,8 @@
 //!    greedy one, oriented where that can be done ([`super::orient`]).
 //! 4. Second opinions: for strong noise a second and third thinning seed; the majority is returned.
 //! 5. Doubt ([`super::self_check`]): the result looks for its own faults.
+//! 6. A doubted result is tried again with the smallest smoothing and with none, and the first without doubts is taken:
+//!    where parts are a few spacings thin or the sampling is patchy, detail reads as noise or outliers.
 //!
 //! Cost: `O(n log n)` in practice.
 
@@ -20,7 +22,7 @@ use super::gap_transforms::gap_transforms;
 use super::labels::{Segregation, boundary_triangles};
 use super::openness::{area_share, patches, rims, unsupported};
 use super::orient::orient;
-use super::prepare::{Cleaned, Prepared, clean, thin_out};
+use super::prepare::{Cleaned, Prepared, Strength, clean, thin_out};
 use super::report::{ClosingReport, CloudReport, ComponentReport, Decision, SecondOpinion, Variation};
 use super::self_check::{doubts, pull_opinions, self_check};
 use crate::delaunay::{Facet, Triangulation};
@@ -69,9 +71,13 @@ pub struct SegregationSettings {
     pub component: Option<usize>,
     /// Seed of the thinning, the one random choice.
     pub seed: u64,
-    /// Share of unsupported area from which a cloud is open. Between the 4.4 % of the closest open shape measured (a
-    /// sphere without a cap of 5 %) and the 2 % that right closed ones stay under.
+    /// Share of unsupported area from which a cloud is open. Measured: closing a hole of 4 % of the area takes at least
+    /// 1.3 % (median 3.6 %, less than 4 because a patch is flat); right closed surfaces have at most 0.8 % with noise up to a
+    /// quarter of the spacing.
     pub open_area_share: f64,
+    /// The same for clouds whose noise reaches [`Self::second_opinion_noise`], of which right closed surfaces have up to
+    /// 1.9 %.
+    pub noisy_open_area_share: f64,
     /// Least share of the points a component must touch; smaller ones are islands.
     pub least_component_share: f64,
     /// Noise over spacing from which a second seed is tried. Measured: below it no run of 108 was wrong.
@@ -86,9 +92,21 @@ impl Default for SegregationSettings {
             cost: CostRule::Local,
             component: None,
             seed: 0,
-            open_area_share: 0.03,
+            open_area_share: 0.015,
+            noisy_open_area_share: 0.03,
             least_component_share: 0.01,
             second_opinion_noise: 0.35,
+        }
+    }
+}
+
+impl SegregationSettings {
+    /// The share from which a cloud of this noise over spacing is open.
+    fn threshold(&self, noise_over_spacing: f64) -> f64 {
+        if noise_over_spacing < self.second_opinion_noise {
+            self.open_area_share
+        } else {
+            self.noisy_open_area_share
         }
     }
 }
@@ -137,7 +155,47 @@ pub fn segregate_cloud(
     settings: &SegregationSettings,
 ) -> Result<CloudSegregation, SegregationError> {
     check(points)?;
-    let cleaned = clean(points, settings);
+    let first = segregate_cleaned(points, Strength::Measured, settings)?;
+    if settings.denoise != Denoise::Auto || !first.report.doubtful() {
+        return Ok(first);
+    }
+    for &strength in gentler(&first.report) {
+        // Another strength may have fewer components than the one asked for; it is then no better.
+        let Ok(mut other) = segregate_cleaned(points, strength, settings) else {
+            continue;
+        };
+        if !other.report.doubtful() {
+            other.segregation.warnings.push(
+                match strength {
+                    Strength::Nothing => {
+                        "dropping outliers and noise gave a surface with doubts, all points as given one without: those are used"
+                    }
+                    _ => "removing all the noise gave a surface with doubts, removing some of it one without: that is used",
+                }
+                .to_owned(),
+            );
+            return Ok(other);
+        }
+    }
+    Ok(first)
+}
+
+/// The strengths below what was done, strongest first.
+fn gentler(report: &CloudReport) -> &'static [Strength] {
+    let done = &report.prepare;
+    match (done.passes, done.outliers) {
+        (0, 0) => &[],
+        (0, _) => &[Strength::Nothing],
+        _ => &[Strength::Light, Strength::Nothing],
+    }
+}
+
+fn segregate_cleaned(
+    points: &[DVec3],
+    strength: Strength,
+    settings: &SegregationSettings,
+) -> Result<CloudSegregation, SegregationError> {
+    let cleaned = clean(points, settings, strength);
     let prepared = thin_out(&cleaned, settings.seed);
     let closure = close_prepared(&prepared, &[], settings)?;
     let first = Run {
@@ -162,7 +220,7 @@ pub(super) fn segregate_with_preset(
     triangles: &[[u32; 3]],
     settings: &SegregationSettings,
 ) -> Result<PresetOutcome, SegregationError> {
-    let cleaned = clean(points, settings);
+    let cleaned = clean(points, settings, Strength::Measured);
     let prepared = thin_out(&cleaned, settings.seed);
     let mut place = vec![u32::MAX; points.len()];
     for (new, &old) in prepared.source.iter().enumerate() {
@@ -240,24 +298,25 @@ fn close_prepared(
         preset,
     };
     let share = settings.least_component_share;
+    let threshold = settings.threshold(prepared.report.noise_over_spacing);
     let mut first = close(&prepared.points, &prepared.spacing_mm, &closing)?;
-    prefer_supported(&mut first, settings);
+    prefer_supported(&mut first, threshold, settings);
     let judged = Judged::new(&first, &BTreeSet::new());
-    if settings.denoise == Denoise::Off || !judged.decide(settings).closed {
+    if settings.denoise == Denoise::Off || !judged.decide(threshold, settings).closed {
         first.give_up_narrow_handles(share);
         return Ok(first);
     }
     let mut second = close_without_off(first, &prepared.points, &prepared.spacing_mm, &closing)?;
-    prefer_supported(&mut second, settings);
+    prefer_supported(&mut second, threshold, settings);
     second.give_up_narrow_handles(share);
     Ok(second)
 }
 
 /// Takes the labels with less unsupported area when that halves it and the solid stays: noise can fill the gap between two
 /// thin parts, which then looks like a large hole that was closed.
-fn prefer_supported(closure: &mut Closure, settings: &SegregationSettings) {
+fn prefer_supported(closure: &mut Closure, threshold: f64, settings: &SegregationSettings) {
     let now = Judged::new(closure, &BTreeSet::new());
-    if now.share < SUSPICIOUS * settings.open_area_share || settings.closed == ClosedOrOpen::Open {
+    if now.share < SUSPICIOUS * threshold || settings.closed == ClosedOrOpen::Open {
         return;
     }
     let mut other = closure.clone();
@@ -274,7 +333,7 @@ fn prefer_supported(closure: &mut Closure, settings: &SegregationSettings) {
 }
 
 /// Share of the threshold from which unsupported area is looked into.
-const SUSPICIOUS: f64 = 0.25;
+const SUSPICIOUS: f64 = 0.5;
 
 /// A closed surface and which of its triangles points support.
 struct Judged {
@@ -303,8 +362,8 @@ impl Judged {
         }
     }
 
-    fn decide(&self, settings: &SegregationSettings) -> Decision {
-        decide(self.share, self.raw.is_empty(), settings)
+    fn decide(&self, threshold: f64, settings: &SegregationSettings) -> Decision {
+        decide(self.share, self.raw.is_empty(), threshold, settings)
     }
 }
 
@@ -382,7 +441,7 @@ fn finish(
         opinions,
     } = chosen;
     let judged = Judged::new(&closure, known);
-    let decision = judged.decide(settings);
+    let decision = judged.decide(settings.threshold(prepared.report.noise_over_spacing), settings);
     let mut report = CloudReport {
         prepare: prepared.report.clone(),
         second_opinions: opinions,
@@ -431,8 +490,11 @@ fn finish(
     if !segregation.closed && !report.rims.is_empty() {
         let rim = &report.rims[0];
         segregation.warnings.push(format!(
-            "the surface is open: interior and exterior stay joined through {} rims, the longest {:.3} mm round ({:.3}, {:.3}, {:.3})",
-            report.rims.len(),
+            "the surface is open: interior and exterior stay joined through {}, the longest {:.3} mm round ({:.3}, {:.3}, {:.3})",
+            match report.rims.len() {
+                1 => "1 rim".to_owned(),
+                n => format!("{n} rims"),
+            },
             rim.length_mm,
             rim.place.x,
             rim.place.y,
@@ -479,9 +541,8 @@ fn nearest_generators(points: &[DVec3], generators: &[DVec3], source: &[u32]) ->
     nearest
 }
 
-fn decide(share: f64, nothing_inside: bool, settings: &SegregationSettings) -> Decision {
+fn decide(share: f64, nothing_inside: bool, threshold: f64, settings: &SegregationSettings) -> Decision {
     let percent = 100.0 * share;
-    let threshold = settings.open_area_share;
     let limit = 100.0 * threshold;
     let (closed, by_user, reason) = match settings.closed {
         ClosedOrOpen::Closed => (

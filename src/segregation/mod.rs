@@ -51,6 +51,7 @@ pub use known_surface::{
 pub use labels::{Segregation, boundary_facets, boundary_triangles};
 pub use mend::{MendedMesh, Mending, mend};
 pub use mesh_repair::{Change, ChangeKind, MeshRepair, MeshRepairReport, segregate_mesh};
+pub use prepare::Strength;
 pub use refine::{RefinedSegregation, segregate_known_refined};
 pub use report::CloudReport;
 pub use self_check::{Doubt, DoubtKind};

@@ -4,7 +4,8 @@
 //! four local spacings), rims, and the share of the area that is unsupported.
 //!
 //! Measured on 7 open shapes and 215 closed runs: open ones have at least 4.4 % of unsupported area once closed by force,
-//! closed ones whose genus is right at most 3 %. The length of the longest rim of the greedy surface does not tell them
+//! closed ones whose genus is right at most 3 %, and at most 0.8 % with noise up to a quarter of the spacing (171 runs of
+//! 3 000 points). Holes of 4 % of the area in curved places take only 1.3-3 % to close (44 runs). The length of the longest rim of the greedy surface does not tell them
 //! apart (a cap of 5 % of a sphere has a rim of 14 edges, a noisy closed scan one of 67).
 
 use crate::geometry::mesh::DisjointSets;

@@ -9,8 +9,9 @@
 //! 4. *Narrow handles* ([`super::handles`]) that could not be given up: a bridge or tunnel a few points round.
 //! 5. *Other runs* must agree on the Euler number and the components: other thinning seeds when the noise is strong; where
 //!    two sheets lie back to back within two spacings, also the minimum cut with a weaker and a stronger pull.
-//! 6. An *open* surface: rims of a few edges are holes that nobody cut, and a share of unsupported area near the threshold
-//!    could be either.
+//! 6. An *open* surface: rims of a few edges are holes that nobody cut, many rims and handles are more likely noise or
+//!    patchy sampling than an object, and a share of unsupported area near the threshold could be either.
+//! 7. *Parts side by side*: with strong noise a small component within three spacings of a larger one may be a piece of it.
 //!
 //! Cost: a sweep over the tetrahedra; two more minimum cuts where parts are thin.
 
@@ -46,6 +47,10 @@ pub struct SelfCheck {
     pub narrow_handles: Vec<NarrowHandle>,
     /// Points all of whose triangles are unsupported.
     pub spikes: usize,
+    /// Small components within three spacings of a larger one.
+    pub parts_side_by_side: usize,
+    /// Where the first of them is, mm.
+    pub side_by_side_place: Option<DVec3>,
     /// Share of the surface points at which the solid or a gap is thinner than two spacings.
     pub thin_share: f64,
     /// Thinnest place of the solid or a gap, in local spacings; 0 when none is thinner than four.
@@ -72,6 +77,10 @@ pub enum DoubtKind {
     Disagreement,
     /// An open surface has rims of a few edges.
     ShortRims,
+    /// An open surface has many rims and handles.
+    ManyRims,
+    /// Small components lie against larger ones in a noisy cloud.
+    PartsSideBySide,
     /// Vertices stayed pinched.
     Pinched,
 }
@@ -93,12 +102,18 @@ pub struct Doubt {
 
 /// Share of points off the surface above which a result is doubtful.
 const DOUBTFUL_OFF: f64 = 0.01;
-/// Unsupported share above which a closed result is doubtful, as a share of the threshold.
+/// Unsupported share above which a closed result is doubtful, as a share of the threshold; its inverse for open ones.
 const NEAR_THRESHOLD: f64 = 0.5;
 /// Far points from which a part may be cut off.
 const FAR_POINTS: usize = 5;
 /// Rims of at most this many edges are not meant.
 const SHORT_RIM: usize = 8;
+/// Rims and twice the handles of an open surface (twice its components less its Euler number) beyond which it is doubted;
+/// those of whole objects measured have one or two.
+const MANY_RIMS: i64 = 6;
+/// Components of less than this share of the points, this near another (spacings), are doubted when noise is strong.
+const SMALL_PART: f64 = 0.1;
+const SIDE_BY_SIDE: f64 = 3.0;
 
 /// The doubts that a report justifies; its decision, closing numbers, self-check, opinions and rims are read.
 pub(super) fn doubts(report: &CloudReport, settings: &SegregationSettings) -> Vec<Doubt> {
@@ -113,7 +128,7 @@ pub(super) fn doubts(report: &CloudReport, settings: &SegregationSettings) -> Ve
         });
     };
     let decision = &report.decision;
-    let (share, threshold) = (decision.unsupported_area_share, settings.open_area_share);
+    let (share, threshold) = (decision.unsupported_area_share, decision.threshold);
     let check = &report.self_check;
     if !decision.closed {
         if !decision.by_user && share > 0.0 && share < threshold / NEAR_THRESHOLD {
@@ -136,8 +151,25 @@ pub(super) fn doubts(report: &CloudReport, settings: &SegregationSettings) -> Ve
                 0.0,
                 Some(first.place),
                 format!(
-                    "{} holes of at most {SHORT_RIM} edges were left in the open surface; they may be gaps between points",
-                    short.len()
+                    "{} of at most {SHORT_RIM} edges left in the open surface may be gaps between points",
+                    match short.len() {
+                        1 => "1 hole".to_owned(),
+                        n => format!("{n} holes"),
+                    }
+                ),
+            );
+        }
+        let topology = &report.topology;
+        let loops = 2 * topology.components as i64 - topology.euler;
+        if loops > MANY_RIMS {
+            doubt(
+                DoubtKind::ManyRims,
+                loops as f64,
+                MANY_RIMS as f64,
+                report.rims.first().map(|r| r.place),
+                format!(
+                    "the open surface has many rims and handles (Euler number {} with {} components): gaps between the points, or noise, may have made them",
+                    topology.euler, topology.components
                 ),
             );
         }
@@ -201,6 +233,18 @@ pub(super) fn doubts(report: &CloudReport, settings: &SegregationSettings) -> Ve
                 "bridges or tunnels at most {} edges round at {} places: the points cannot show whether they are real",
                 super::handles::LONGEST_LOOP,
                 check.narrow_handles.len()
+            ),
+        );
+    }
+    if check.parts_side_by_side > 0 && report.prepare.noise_over_spacing >= settings.second_opinion_noise {
+        doubt(
+            DoubtKind::PartsSideBySide,
+            check.parts_side_by_side as f64,
+            0.0,
+            check.side_by_side_place,
+            format!(
+                "{} small parts lie within {SIDE_BY_SIDE} spacings of a larger one: noise may have cut them off it",
+                check.parts_side_by_side
             ),
         );
     }
@@ -273,6 +317,7 @@ pub(super) fn self_check(
     };
     out.spikes = all_unsupported(mesh.points.len(), &mesh.triangles, unsupported).len();
     far_points(&mut out, closure, mesh, points, spacing_mm);
+    parts_side_by_side(&mut out, closure, mesh);
     thin_parts(&mut out, closure, mesh);
     out
 }
@@ -319,6 +364,45 @@ fn far_points(
             out.farthest_place = Some(p);
         }
     }
+}
+
+fn parts_side_by_side(out: &mut SelfCheck, closure: &Closure, mesh: &TriangleMesh) {
+    let parts = mesh.components();
+    if parts.len() < 2 {
+        return;
+    }
+    let mut part_of = vec![u32::MAX; mesh.points.len()];
+    for (number, part) in parts.iter().enumerate() {
+        for v in part.iter().flat_map(|&t| mesh.triangles[t as usize]) {
+            part_of[v as usize] = number as u32;
+        }
+    }
+    let mut size = vec![0usize; parts.len()];
+    for &p in part_of.iter().filter(|p| **p != u32::MAX) {
+        size[p as usize] += 1;
+    }
+    let on: usize = size.iter().sum();
+    let mut near = vec![false; parts.len()];
+    let mut place = None;
+    // Neighbours in the triangulation: two parts that near have edges between them.
+    for t in closure.triangulation.finite_tets() {
+        let v = closure.triangulation.tet(t).map(|v| v.index());
+        for (i, j) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
+            let (p, q) = (part_of[v[i]], part_of[v[j]]);
+            if p == q || p == u32::MAX || q == u32::MAX {
+                continue;
+            }
+            let small = if size[p as usize] < size[q as usize] { p } else { q } as usize;
+            let spacing = 0.5 * (closure.spacing_mm[v[i]] + closure.spacing_mm[v[j]]);
+            let apart = mesh.points[v[i]].distance(mesh.points[v[j]]);
+            if (size[small] as f64) < SMALL_PART * on as f64 && apart < SIDE_BY_SIDE * spacing {
+                near[small] = true;
+                place = place.or(Some(mesh.points[v[i]]));
+            }
+        }
+    }
+    out.parts_side_by_side = near.iter().filter(|n| **n).count();
+    out.side_by_side_place = place;
 }
 
 fn thin_parts(out: &mut SelfCheck, closure: &Closure, mesh: &TriangleMesh) {

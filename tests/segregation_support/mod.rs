@@ -85,6 +85,33 @@ pub fn sample(mesh: &TriangleMesh, n: usize, seed: u64) -> Vec<DVec3> {
         .collect()
 }
 
+/// `n` points on a mesh with one hole: of a larger sample those nearest to a random point of the surface, on the side of it
+/// that faces the same way, are left out, `share` of all, so that the hole has that share of the area.
+pub fn sample_with_hole(mesh: &TriangleMesh, n: usize, share: f64, seed: u64) -> Vec<DVec3> {
+    let all = (n as f64 / (1.0 - share)).round() as usize;
+    let points = sample(mesh, all, seed);
+    let closest = medial_scaffold::geometry::ClosestOnMesh::new(mesh).expect("the mesh has triangles");
+    let normals: Vec<DVec3> = points
+        .iter()
+        .map(|&p| {
+            let [a, b, c] =
+                mesh.triangles[closest.closest(p).triangle as usize].map(|i| mesh.points[i as usize]);
+            (b - a).cross(c - a).normalize_or_zero()
+        })
+        .collect();
+    let centre = (seed as usize * 7919) % all;
+    let mut order: Vec<usize> = (0..all).collect();
+    order.sort_by(|&i, &j| {
+        let key = |k: usize| {
+            let turned = normals[k].dot(normals[centre]) < -0.2;
+            (turned, points[k].distance(points[centre]))
+        };
+        let (a, b) = (key(i), key(j));
+        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+    });
+    order[all - n..].iter().map(|&k| points[k]).collect()
+}
+
 /// The folder of real shapes, when there is one.
 pub fn data() -> Option<PathBuf> {
     let root = std::env::var_os("MEDIAL_DATA").map_or_else(
@@ -259,7 +286,6 @@ pub fn corrupted(
     outliers: f64,
     seed: u64,
 ) -> Vec<DVec3> {
-    use rand_distr::{Distribution, StandardNormal};
     let [low, high] = mesh.bounds().expect("a mesh with points");
     let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_add(1_000_000));
     let mut points = Vec::with_capacity(n);
@@ -273,18 +299,32 @@ pub fn corrupted(
         }
         round += 1;
     }
-    if sigma > 0.0 {
-        for p in &mut points {
-            let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-            *p += sigma * DVec3::new(normal(), normal(), normal());
-        }
-    }
+    shake_with(&mut points, sigma, &mut rng);
     let margin = 0.1 * (high - low);
     for _ in 0..(outliers * n as f64) as usize {
         let u = DVec3::new(rng.random(), rng.random(), rng.random());
         points.push(low - margin + u * (high - low + 2.0 * margin));
     }
     points
+}
+
+/// Adds isotropic Gaussian noise.
+pub fn shake(points: &mut [DVec3], sigma: f64, seed: u64) {
+    shake_with(
+        points,
+        sigma,
+        &mut ChaCha8Rng::seed_from_u64(seed.wrapping_add(2_000_000)),
+    );
+}
+
+fn shake_with(points: &mut [DVec3], sigma: f64, rng: &mut ChaCha8Rng) {
+    use rand_distr::{Distribution, StandardNormal};
+    if sigma > 0.0 {
+        for p in points {
+            let mut normal = || -> f64 { StandardNormal.sample(rng) };
+            *p += sigma * DVec3::new(normal(), normal(), normal());
+        }
+    }
 }
 
 /// A mesh against the truth; distances in spacings.
@@ -295,6 +335,8 @@ pub struct Verdict {
     pub mean: f64,
     /// Per cent; NaN for an open mesh.
     pub volume_error: f64,
+    /// The part of the volume error that any mesh of these triangles has, its vertices on the true surface: per cent.
+    pub inscription_error: f64,
     pub open_edges: usize,
 }
 
@@ -321,6 +363,16 @@ pub fn judge(surface: &TriangleMesh, truth: &TriangleMesh, spacing: f64) -> Verd
         );
     }
     let volume = truth.signed_volume();
+    let error = |mesh: &TriangleMesh| 100.0 * (mesh.signed_volume().abs() - volume) / volume;
+    let (mut volume_error, mut inscription_error) = (f64::NAN, f64::NAN);
+    if topology.watertight {
+        volume_error = error(surface);
+        let mut inscribed = surface.clone();
+        for p in &mut inscribed.points {
+            *p = to_truth.closest(*p).point;
+        }
+        inscription_error = error(&inscribed);
+    }
     Verdict {
         right: topology.watertight
             && topology.nonmanifold_vertices == 0
@@ -328,11 +380,8 @@ pub fn judge(surface: &TriangleMesh, truth: &TriangleMesh, spacing: f64) -> Verd
             && topology.components == wanted.components,
         hausdorff: distances.iter().copied().fold(0.0, f64::max) / spacing,
         mean: distances.iter().sum::<f64>() / distances.len().max(1) as f64 / spacing,
-        volume_error: if topology.watertight {
-            100.0 * (surface.signed_volume().abs() - volume) / volume
-        } else {
-            f64::NAN
-        },
+        volume_error,
+        inscription_error,
         open_edges: topology.boundary_edges,
     }
 }

@@ -25,9 +25,24 @@ use glam::DVec3;
 use knn::KnnLists;
 use serde::{Deserialize, Serialize};
 
+/// How much of what the measured noise asks for is done.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Strength {
+    /// All of it.
+    #[default]
+    Measured,
+    /// Outliers dropped and the smallest pass, whatever the noise.
+    Light,
+    /// Nothing: every distinct point as given.
+    Nothing,
+}
+
 /// What was done to the cloud and how far its points moved.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PrepareReport {
+    /// How much of what the noise asks for was done.
+    pub strength: Strength,
     /// Points given.
     pub points: usize,
     /// Exact duplicates merged.
@@ -90,10 +105,15 @@ impl Cleaned {
 }
 
 /// Steps 1 to 3. Points must be finite (checked at the door of the cloud route).
-pub fn clean(points: &[DVec3], settings: &SegregationSettings) -> Cleaned {
+pub fn clean(points: &[DVec3], settings: &SegregationSettings, strength: Strength) -> Cleaned {
+    let denoise = match strength {
+        Strength::Nothing => Denoise::Off,
+        _ => settings.denoise,
+    };
     let distinct = distinct_sorted(points);
     let mut report = PrepareReport {
         points: points.len(),
+        strength,
         duplicates: points.len() - distinct.points.len(),
         ..Default::default()
     };
@@ -102,7 +122,7 @@ pub fn clean(points: &[DVec3], settings: &SegregationSettings) -> Cleaned {
         mut source,
     } = distinct;
     let mut lists = KnnLists::new(&points, noise::LARGE);
-    if settings.denoise != Denoise::Off {
+    if denoise != Denoise::Off {
         let keep = outliers::keep(&mut points, &mut lists);
         report.outliers = source.len() - keep.len();
         source = keep.iter().map(|&i| source[i as usize]).collect();
@@ -111,11 +131,14 @@ pub fn clean(points: &[DVec3], settings: &SegregationSettings) -> Cleaned {
     report.noise_over_spacing = level.noise_over_spacing;
     report.spacing_mm = level.spacing_mm;
     let mut moves = vec![0.0; points.len()];
-    let plan = match settings.denoise {
+    let mut plan = match denoise {
         Denoise::Off => None,
         Denoise::Auto => noise::plan(level.noise_over_spacing),
         Denoise::Always => noise::plan(level.noise_over_spacing.max(noise::THRESHOLD)),
     };
+    if strength == Strength::Light {
+        plan = plan.map(noise::SmoothingPlan::light);
+    }
     if let Some(plan) = plan {
         let before = points.clone();
         smooth::smooth(&mut points, &mut lists, &plan);

@@ -50,6 +50,16 @@ pub struct SmoothingPlan {
     pub thinning: f64,
 }
 
+impl SmoothingPlan {
+    /// The plan of the weakest noise for this level: it moves thin parts least.
+    pub fn light(self) -> Self {
+        Self {
+            noise_over_spacing: self.noise_over_spacing,
+            ..plan(THRESHOLD).unwrap_or(self)
+        }
+    }
+}
+
 /// The plan for a level; `None` when it is below [`THRESHOLD`]. Sizes measured: one or two passes suffice for the shape,
 /// more of them move thin parts.
 pub fn plan(noise_over_spacing: f64) -> Option<SmoothingPlan> {
