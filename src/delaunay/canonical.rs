@@ -13,6 +13,7 @@
 //! pages (slow to be had on virtual machines), nor curves cut into slabs of x (the insertion loses more), nor counting in
 //! vector registers (buckets are too small) made it faster.
 
+use super::counters::Counters;
 use super::insertion::INF;
 use super::triangulation::Triangulation;
 use crate::geometry::VertexId;
@@ -57,13 +58,10 @@ pub(super) fn canonical(
     let Renamed {
         places,
         mut ends,
+        finite,
         ghosts,
     } = rename(&mut vertices, order);
-    let finite = ends.last().map_or(0, |&end| end as usize);
     let total = finite + ghosts.len();
-    // Where buckets begin; dealing moves each beginning to its end.
-    ends.rotate_right(1);
-    ends[0] = 0;
     let mut records = vec![[0u32; 4]; total];
     let id: Vec<AtomicU32> = zeros::<u32>(slots).into_iter().map(AtomicU32::new).collect();
     let (finite_records, ghost_records) = records.split_at_mut(finite);
@@ -138,8 +136,11 @@ pub(super) fn zeros<T: Clone + Default>(len: usize) -> Vec<T> {
 struct Renamed {
     /// The rotation of every tetrahedron, as in [`PLACES`].
     places: Vec<u8>,
-    /// For each vertex the number of finite tetrahedra whose smallest vertex it or a smaller one is.
+    /// For each vertex the number of finite tetrahedra whose smallest vertex is smaller: where its bucket begins. Dealing
+    /// moves each beginning to its end.
     ends: Vec<u32>,
+    /// Number of finite tetrahedra.
+    finite: usize,
     /// Slots that hold ghosts, in order.
     ghosts: Vec<u32>,
 }
@@ -147,19 +148,7 @@ struct Renamed {
 /// Step 1 for all tetrahedra.
 fn rename(vertices: &mut [[u32; 4]], order: Vec<u32>) -> Renamed {
     let mut places: Vec<u8> = zeros(vertices.len());
-    let counts: Vec<AtomicU32> = zeros::<u32>(order.len())
-        .into_iter()
-        .map(AtomicU32::new)
-        .collect();
-    let alone = rayon::current_num_threads() == 1;
-    let count = |vertex: u32| {
-        let count = &counts[vertex as usize];
-        if alone {
-            count.store(count.load(Relaxed) + 1, Relaxed);
-        } else {
-            count.fetch_add(1, Relaxed);
-        }
-    };
+    let mut counters = Counters::new(order.len());
     let ghosts: Vec<Vec<u32>> = (vertices.par_chunks_mut(CHUNK), places.par_chunks_mut(CHUNK))
         .into_par_iter()
         .enumerate()
@@ -169,7 +158,7 @@ fn rename(vertices: &mut [[u32; 4]], order: Vec<u32>) -> Renamed {
             for ((v, places), slot) in tets.iter_mut().zip(places).zip(first..) {
                 (*v, *places) = renamed(*v, &order);
                 if v[3] != INF {
-                    count(v[0]);
+                    counters.add(v[0] as usize, 1);
                 } else if v[0] != INF {
                     ghosts.push(slot);
                 }
@@ -177,15 +166,11 @@ fn rename(vertices: &mut [[u32; 4]], order: Vec<u32>) -> Renamed {
             ghosts
         })
         .collect();
-    let mut ends: Vec<u32> = counts.into_iter().map(AtomicU32::into_inner).collect();
-    let mut sum = 0;
-    for end in &mut ends {
-        sum += *end;
-        *end = sum;
-    }
+    let finite = counters.accumulate() as usize;
     Renamed {
         places,
-        ends,
+        ends: counters.into_inner(),
+        finite,
         ghosts: ghosts.concat(),
     }
 }

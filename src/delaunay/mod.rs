@@ -10,6 +10,7 @@
 //! [`Triangulation::dimension`] says so and there are no tetrahedra.
 
 mod canonical;
+pub(crate) mod counters;
 pub mod door;
 mod filter;
 mod insertion;

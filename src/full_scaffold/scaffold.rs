@@ -1,8 +1,8 @@
 //! The full scaffold as read off a Delaunay triangulation.
 //!
 //! In: [`Triangulation`]. Out: [`FullScaffold`]. Steps: (1) sphere and signs of every tetrahedron; (2) flow type of every
-//! triangle from the two signs across it and its angles; (3) critical points counted, sheet sources through the edges that
-//! face an obtuse angle; (4) vertices whose spheres coincide gathered.
+//! triangle from the two signs across it and its angles, and whether the two spheres coincide; (3) critical points counted,
+//! sheet sources through the edges that face an obtuse angle; (4) vertices whose spheres coincide gathered.
 //!
 //! After Leymarie & Kimia 2007 (types of shocks) and Siersma 1999, Giesen & John 2008 (critical points of the distance to
 //! points are the Delaunay simplices that hold their centre and whose smallest ball is empty). We read the scaffold off the
@@ -13,7 +13,8 @@
 use super::flow::{CriticalCounts, FlowType};
 use super::merged::{DegenerateVertex, degenerate_vertices};
 use super::planar::{self, PlanarScaffold};
-use super::spheres::{Geometries, Signs};
+use super::spheres::{Geometries, Signs, cospherical};
+use crate::delaunay::counters::Counters;
 use crate::delaunay::door::Frame;
 use crate::delaunay::lanes::with_lanes;
 use crate::delaunay::{DelaunayError, Facet, Triangulation};
@@ -22,6 +23,7 @@ use crate::geometry::{Sphere, TetId};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::borrow::Cow;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// Flow along the curve element dual to a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -227,35 +229,20 @@ pub fn full_scaffold(t: &Triangulation) -> Result<FullScaffold, DelaunayError> {
         return planar::flat_scaffold(t, &points);
     }
     let grid = Grid::new(points.iter().fold(0.0, |m, p| p.abs().max_element().max(m)));
-    let nowhere = Sphere {
-        centre: DVec3::ZERO,
-        radius: 0.0,
-    };
-    let mut spheres = vec![nowhere; t.num_finite()];
-    let mut signs = vec![Signs::default(); t.num_finite()];
-    let chunks = spheres.par_chunks_mut(CHUNK).zip(signs.par_chunks_mut(CHUNK));
-    chunks.enumerate().for_each(|(i, (spheres, signs))| {
-        with_lanes(Geometries {
-            t,
-            points: &points,
-            grid,
-            first: (i * CHUNK) as u32,
-            spheres: &mut *spheres,
-            signs,
-        });
-        for sphere in spheres.iter_mut().filter(|_| frame.exponent != 0) {
-            sphere.centre = sphere.centre.to_array().map(|v| frame.restore(v)).into();
-            sphere.radius = frame.restore(sphere.radius);
-        }
-    });
-    tell_both_sides(t, &mut signs);
-    let mut flows = vec![0; signs.len()];
-    let mut counts = classify(t, &signs, &mut flows);
+    let Geometry {
+        spheres,
+        signs,
+        obtuse,
+    } = geometry(t, &points, frame);
+    let mut classified = classify(t, &points, grid, &signs, obtuse);
+    drop(signs);
+    tell_both_sides(t, &mut classified);
+    let mut counts = classified.counts;
     counts.generators = t.points.len() as u64;
     // Edges come from Euler's formula; those without a sheet source are the ones that face an angle that is not acute.
     let triangles = (t.num_finite() as u64 * 4 + (t.num_tets() - t.num_finite()) as u64) / 2;
     let edges = counts.generators + triangles - t.num_finite() as u64 - 1;
-    counts.sheet_sources = edges - edges_facing_obtuse_angles(t, &signs);
+    counts.sheet_sources = edges - edges_facing_obtuse_angles(t, classified.obtuse, classified.facing);
     counts.morse = counts.generators as i64 - counts.sheet_sources as i64 + counts.curve_sources as i64
         - counts.sinks as i64;
     let mut out = FullScaffold {
@@ -263,108 +250,205 @@ pub fn full_scaffold(t: &Triangulation) -> Result<FullScaffold, DelaunayError> {
         counts,
         degenerate: Vec::new(),
         planar: None,
-        signs: signs.par_iter().map(|s| s.signs).collect(),
-        flows,
+        signs: classified.signs,
+        flows: classified.flows,
     };
     out.degenerate = degenerate_vertices(t, &out);
     Ok(out)
 }
 
-/// Copies the bits of coinciding spheres from the owners of facets to the other sides. Few clouds have any.
-fn tell_both_sides(t: &Triangulation, signs: &mut [Signs]) {
-    let tied: Vec<u32> = signs
-        .par_iter()
-        .zip(0..signs.len() as u32)
-        .filter(|(s, _)| s.signs >> 4 != 0)
-        .map(|(_, i)| i)
+/// Tetrahedra handled by one task at a time.
+const CHUNK: usize = 1 << 14;
+
+/// What step 1 gives.
+struct Geometry {
+    /// Circumscribed spheres, mm.
+    spheres: Vec<Sphere>,
+    signs: Vec<Signs>,
+    /// [`Geometries::obtuse`].
+    obtuse: Vec<u16>,
+}
+
+/// Step 1; `points` are those of the triangulation in the frame of the predicates.
+fn geometry(t: &Triangulation, points: &[DVec3], frame: Frame) -> Geometry {
+    // Zeros, which the system hands out without writing them, instead of spheres.
+    let mut spheres: Vec<Sphere> = vec![[0.0; 4]; t.num_finite()]
+        .into_iter()
+        .map(|[x, y, z, radius]| Sphere {
+            centre: DVec3::new(x, y, z),
+            radius,
+        })
         .collect();
-    for tet in tied.into_iter().map(TetId) {
-        for index in (0..4u8)
-            .filter(|i| signs[tet.index()].signs >> (4 + i) & 1 == 1)
-            .collect::<Vec<_>>()
-        {
-            let other = t.mirror(Facet { tet, index });
-            signs[other.tet.index()].signs |= 16 << other.index;
+    let mut signs = vec![Signs::default(); t.num_finite()];
+    let mut obtuse = vec![0; t.num_finite()];
+    let chunks = (
+        spheres.par_chunks_mut(CHUNK),
+        signs.par_chunks_mut(CHUNK),
+        obtuse.par_chunks_mut(CHUNK),
+    )
+        .into_par_iter();
+    chunks.enumerate().for_each(|(i, (spheres, signs, obtuse))| {
+        with_lanes(Geometries {
+            t,
+            points,
+            first: (i * CHUNK) as u32,
+            spheres: &mut *spheres,
+            signs,
+            obtuse,
+        });
+        for sphere in spheres.iter_mut().filter(|_| frame.exponent != 0) {
+            sphere.centre = sphere.centre.to_array().map(|v| frame.restore(v)).into();
+            sphere.radius = frame.restore(sphere.radius);
+        }
+    });
+    Geometry {
+        spheres,
+        signs,
+        obtuse,
+    }
+}
+
+/// What step 2 gives.
+struct Classified {
+    /// As in [`FullScaffold`], but bits of coinciding spheres only on the side of the owner, the tetrahedron of smaller id.
+    signs: Vec<u8>,
+    flows: Vec<u8>,
+    /// Tetrahedra that own a facet across which the spheres coincide.
+    tied: Vec<u32>,
+    /// [`Geometries::obtuse`] of owned facets.
+    obtuse: Vec<u16>,
+    /// For each vertex the number of owned facets with an obtuse angle that faces an edge of which it is the smaller end.
+    facing: Counters,
+    counts: CriticalCounts,
+}
+
+/// Step 2: the facets each tetrahedron owns, and the numbers of critical points seen on the way. Without branches: which
+/// facets are owned and how they flow is as good as random.
+fn classify(
+    t: &Triangulation,
+    points: &[DVec3],
+    grid: Grid,
+    signs: &[Signs],
+    mut obtuse: Vec<u16>,
+) -> Classified {
+    let n = signs.len();
+    let (mut all_signs, mut flows) = (vec![0u8; n], vec![0u8; n]);
+    let facing = Counters::new(t.points.len());
+    let parts = (
+        all_signs.par_chunks_mut(CHUNK),
+        flows.par_chunks_mut(CHUNK),
+        obtuse.par_chunks_mut(CHUNK),
+    )
+        .into_par_iter()
+        .enumerate()
+        .map(|(chunk, (all_signs, flows, obtuse))| {
+            let [mut sinks, mut sources, mut relays] = [0u64; 3];
+            let mut tied = Vec::new();
+            let first = (chunk * CHUNK) as u32;
+            for (((out, flow), codes), tet) in all_signs.iter_mut().zip(flows).zip(obtuse).zip(first..) {
+                let own = signs[tet as usize];
+                let tet = TetId(tet);
+                sinks += u64::from(own.outside() == 15);
+                let (mut ties, mut flow_bits, mut owned_codes) = (0u8, 0u8, 0u16);
+                for index in 0..4u8 {
+                    let other = t.mirror(Facet { tet, index });
+                    let owned = tet < other.tet;
+                    let is_finite = t.is_finite(other.tet);
+                    // What is far away is only looked at when it is wanted.
+                    let looked_at = if owned & is_finite { other.tet } else { tet };
+                    let beyond = signs[looked_at.index()];
+                    let other_outside = u8::from(!is_finite) | beyond.outside() >> other.index;
+                    if owned & is_finite
+                        && own.may_coincide(beyond)
+                        && cospherical(grid, t.tet(tet).map(|v| points[v.index()]), {
+                            points[t.tet(other.tet)[other.index as usize].index()]
+                        })
+                    {
+                        ties |= 16 << index;
+                    }
+                    let owned = u8::from(owned);
+                    let gabriel = own.outside() >> index & other_outside & 1;
+                    let code = *codes >> (4 * index) & 15;
+                    let obtuse = u8::from(code != 0);
+                    flow_bits |= (owned * (2 * (1 - gabriel) + obtuse)) << (2 * index);
+                    owned_codes |= (code * u16::from(owned)) << (4 * index);
+                    sources += u64::from(owned & gabriel & (1 - obtuse));
+                    relays += u64::from(owned & gabriel & obtuse);
+                    // The edge of another angle counts nothing.
+                    let [smaller, _] = facing_edge(t, tet, index, code.wrapping_sub(1));
+                    facing.add(smaller as usize, u32::from(owned & obtuse));
+                }
+                *out = own.outside() | ties;
+                *flow = flow_bits;
+                *codes = owned_codes;
+                if ties != 0 {
+                    tied.push(tet.0);
+                }
+            }
+            ([sinks, sources, relays], tied)
+        });
+    let parts: Vec<([u64; 3], Vec<u32>)> = parts.collect();
+    let [sinks, curve_sources, relays] = [0, 1, 2].map(|k| parts.iter().map(|(c, _)| c[k]).sum());
+    Classified {
+        signs: all_signs,
+        flows,
+        tied: parts.into_iter().flat_map(|(_, tied)| tied).collect(),
+        obtuse,
+        facing,
+        counts: CriticalCounts {
+            sinks,
+            curve_sources,
+            relays,
+            ..CriticalCounts::default()
+        },
+    }
+}
+
+/// Copies the bits of coinciding spheres from the owners of facets to the other sides. Few clouds have any.
+fn tell_both_sides(t: &Triangulation, classified: &mut Classified) {
+    let signs = &mut classified.signs;
+    for tet in classified.tied.iter().copied().map(TetId) {
+        // Bits of facets that others own may have come from them.
+        for facet in (0..4u8).map(|index| Facet { tet, index }) {
+            let other = t.mirror(facet);
+            if facet < other && signs[tet.index()] >> (4 + facet.index) & 1 == 1 {
+                signs[other.tet.index()] |= 16 << other.index;
+            }
         }
     }
 }
 
-/// Tetrahedra classified by one task at a time.
-const CHUNK: usize = 1 << 14;
-
-/// Step 2: flow of the facets each tetrahedron owns, and the numbers of critical points seen on the way. Without branches:
-/// flows are as good as random.
-fn classify(t: &Triangulation, signs: &[Signs], flows: &mut [u8]) -> CriticalCounts {
-    let parts = flows.par_chunks_mut(CHUNK).enumerate().map(|(chunk, flows)| {
-        let [mut sinks, mut sources, mut relays] = [0u64; 3];
-        for (i, flow) in flows.iter_mut().enumerate() {
-            let i = chunk * CHUNK + i;
-            let own = signs[i];
-            sinks += u64::from(own.signs & 15 == 15);
-            for index in 0..4u8 {
-                let facet = Facet {
-                    tet: TetId(i as u32),
-                    index,
-                };
-                let other = t.mirror(facet);
-                let owned = u8::from(facet < other);
-                let other_outside = signs
-                    .get(other.tet.index())
-                    .map_or(1, |s| s.signs >> other.index & 1);
-                let gabriel = own.signs >> index & other_outside & 1;
-                let obtuse = u8::from(own.obtuse >> (4 * index) & 15 != 0);
-                *flow |= (owned * (2 * (1 - gabriel) + obtuse)) << (2 * index);
-                sources += u64::from(owned & gabriel & (1 - obtuse));
-                relays += u64::from(owned & gabriel & obtuse);
-            }
-        }
-        [sinks, sources, relays]
-    });
-    let [sinks, curve_sources, relays] = parts.reduce(|| [0; 3], |a, b| std::array::from_fn(|k| a[k] + b[k]));
-    CriticalCounts {
-        sinks,
-        curve_sources,
-        relays,
-        ..CriticalCounts::default()
-    }
+/// The edge that faces the vertex in place `at` in a facet, smaller vertex first.
+#[inline(always)]
+fn facing_edge(t: &Triangulation, tet: TetId, index: u8, at: u16) -> [u32; 2] {
+    let v = t.tet(tet);
+    let [p, q] = OPPOSITE[index as usize][(at & 3) as usize];
+    let (a, b) = (v[(p & 3) as usize].0, v[(q & 3) as usize].0);
+    [a.min(b), a.max(b)]
 }
 
 /// Step 3: the number of edges that face an angle that is not acute in some triangle. Such an edge has no sheet source, and
 /// Delaunay edges need no other witness than their link. Edges are collected by their smaller vertex and told apart.
-fn edges_facing_obtuse_angles(t: &Triangulation, signs: &[Signs]) -> u64 {
+fn edges_facing_obtuse_angles(t: &Triangulation, obtuse: Vec<u16>, mut facing: Counters) -> u64 {
     let n = t.points.len();
-    let facing = |tet: usize, index: usize, at: u16| {
-        let v = t.tet(TetId(tet as u32));
-        let [p, q] = OPPOSITE[index][(at & 3) as usize];
-        let (a, b) = (v[p as usize].0, v[q as usize].0);
-        (a.min(b) as usize, a.max(b))
-    };
-    let mut starts = vec![0u32; n + 1];
-    for (tet, s) in signs.iter().enumerate() {
-        for index in 0..4 {
-            let code = s.obtuse >> (4 * index) & 15;
-            // The edge of another angle counts nothing.
-            let (a, _) = facing(tet, index, code.wrapping_sub(1));
-            starts[a] += u32::from(code != 0);
+    let sum = facing.accumulate();
+    let ends: Vec<AtomicU32> = vec![0u32; sum as usize].into_iter().map(AtomicU32::new).collect();
+    obtuse.par_chunks(CHUNK).enumerate().for_each(|(chunk, obtuse)| {
+        for (&codes, tet) in obtuse.iter().zip((chunk * CHUNK) as u32..) {
+            let mut rest = codes;
+            while rest != 0 {
+                let index = rest.trailing_zeros() as usize / 4;
+                let code = rest >> (4 * index) & 15;
+                rest &= !(15 << (4 * index));
+                let [a, b] = facing_edge(t, TetId(tet), index as u8, code - 1);
+                ends[facing.add(a as usize, 1) as usize].store(b, Relaxed);
+            }
         }
-    }
-    let mut sum = 0;
-    for start in &mut starts {
-        (*start, sum) = (sum, sum + *start);
-    }
-    let mut ends = vec![0u32; sum as usize];
-    for (tet, s) in signs.iter().enumerate() {
-        let mut rest = s.obtuse;
-        while rest != 0 {
-            let index = rest.trailing_zeros() as usize / 4;
-            let code = rest >> (4 * index) & 15;
-            rest &= !(15 << (4 * index));
-            let (a, b) = facing(tet, index, code - 1);
-            ends[starts[a] as usize] = b;
-            starts[a] += 1;
-        }
-    }
-    // Each start has moved to the next one's old place.
+    });
+    drop(obtuse);
+    // Each beginning has moved to the next one's old place.
+    let starts = facing.into_inner();
+    let ends: Vec<u32> = ends.into_iter().map(AtomicU32::into_inner).collect();
     (0..n)
         .into_par_iter()
         .with_min_len(CHUNK)

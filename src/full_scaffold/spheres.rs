@@ -1,18 +1,18 @@
-//! One tetrahedron at a time: its sphere, on which side of each facet the centre lies, which neighbours share the sphere, which
-//! angles are not acute.
+//! One tetrahedron at a time: its sphere, on which side of each facet the centre lies, which angles are not acute.
 //!
-//! In: a triangulation. Out: [`TetGeometry`] for each finite tetrahedron. With `u, v, w` from the first corner to the others,
+//! In: a triangulation. Out: [`Sphere`], [`Signs`] and obtuse angles of each finite tetrahedron. With `u, v, w` from the first corner to the others,
 //! `m = |u|^2 v x w + |v|^2 w x u + |w|^2 u x v` and `det = u . v x w` the centre is `m / (2 det)` from that corner, its
 //! barycentric coordinates are `m . (v x w) / (2 det^2)` and so on, and a point `q` (from that corner) lies inside the sphere
 //! when `q . m > |q|^2 det`. The angles of the four facets come from the six products of `u, v, w`. All signs come from these
 //! shared quantities when they clear a forward error bound and from the exact predicates when not: the barycentric coordinate
 //! of a vertex is positive exactly when the vertex lies outside the smallest ball of the opposite facet (Leymarie & Kimia
-//! 2007, where this tells the four types of A1^3 shocks apart). What belongs to a facet is found on one side of it, that of
-//! the tetrahedron of smaller id, which owns it. Cost: about 150 operations a tetrahedron, four tetrahedra at a time.
+//! 2007, where this tells the four types of A1^3 shocks apart). Nothing here looks at a neighbour, which would be far away in
+//! memory: whether two spheres coincide is asked later, and only when their radii agree in their leading bits. Cost: about 120
+//! operations a tetrahedron, four tetrahedra at a time.
 
 use super::four::{Four, FourVectors};
 use crate::delaunay::lanes::{Lanes, Task};
-use crate::delaunay::{Facet, INFINITE, Triangulation};
+use crate::delaunay::{Facet, Triangulation};
 use crate::geometry::TetId;
 use crate::geometry::circumsphere::{self, Sphere};
 use crate::geometry::fixed::Grid;
@@ -22,41 +22,57 @@ use crate::geometry::predicates::{
 use glam::DVec3;
 use std::ops::{Add, Sub};
 
-/// Signs and sphere of one finite tetrahedron.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct TetGeometry {
-    /// The circumscribed sphere, in the frame of the predicates.
-    pub sphere: Sphere,
-    /// Bit `i`: vertex `i` lies outside the smallest ball of facet `i` (ties broken by coordinates).
-    pub outside: u8,
-    /// Bit `i`: the facet is owned and the vertex beyond it lies exactly on the sphere. Unset for hull facets.
-    pub cospherical: u8,
-    /// Four bits for each owned facet: one more than the place of the vertex with an angle that is not acute, or 0.
-    pub obtuse: u16,
-}
-
 /// Relative rounding error of every quantity below, with room: none passes through more than 24 roundings, counting those
 /// of the differences, of the lengths in the bound and of the bound itself.
 const ERROR: f64 = 48.0 * EPSILON;
 
-/// Geometry of the tetrahedra `first..first + spheres.len()`, in order, for [`crate::delaunay::lanes::with_lanes`]: four at a time, and one at a time what
-/// their plain arithmetic leaves open. The same as [`tet_geometry`] for each.
+/// Geometry of the tetrahedra `first..first + spheres.len()`, in order, for [`crate::delaunay::lanes::with_lanes`]: four at a
+/// time, and one at a time what their plain arithmetic leaves open. The same as [`one_geometry`] for each.
 pub(super) struct Geometries<'a> {
     pub t: &'a Triangulation,
+    /// Points of the triangulation in the frame of the predicates.
     pub points: &'a [DVec3],
-    pub grid: Grid,
     pub first: u32,
+    /// Circumscribed spheres, in the frame of the predicates.
     pub spheres: &'a mut [Sphere],
     pub signs: &'a mut [Signs],
+    /// For each facet four bits, one more than the place of the vertex with an angle that is not acute, or 0.
+    pub obtuse: &'a mut [u16],
 }
 
-/// What is found for one tetrahedron besides its sphere.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Signs {
-    /// [`TetGeometry::outside`] and, from bit 4, [`TetGeometry::cospherical`].
-    pub signs: u8,
-    /// [`TetGeometry::obtuse`].
-    pub obtuse: u16,
+/// What a neighbour is asked for, in as few bits as will do, because neighbours are far away in memory: bit `i`, vertex `i` lies
+/// outside the smallest ball of facet `i` (ties broken by coordinates); from bit 4, leading bits of the radius, wrapped around.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Signs(u16);
+
+impl Signs {
+    /// Values that the bits of a radius take; the next one stands for radii that overflowed.
+    const RADII: u32 = 4095;
+
+    fn new(radius: f64, outside: u8) -> Self {
+        let leading = (radius.to_bits() >> 32) as u32;
+        let wrapped = if radius.is_finite() {
+            leading % Self::RADII
+        } else {
+            Self::RADII
+        };
+        Self((wrapped << 4) as u16 | u16::from(outside))
+    }
+
+    /// The four signs.
+    #[inline(always)]
+    pub(super) fn outside(self) -> u8 {
+        self.0 as u8 & 15
+    }
+
+    /// Whether two spheres may be the same. Radii are right to `6e-11` (see [`circumsphere`]) unless they overflow, and the
+    /// leading bits have steps of `2^-20`, so those of equal spheres differ by one at most.
+    #[inline(always)]
+    pub(super) fn may_coincide(self, other: Self) -> bool {
+        let (a, b) = (u32::from(self.0 >> 4), u32::from(other.0 >> 4));
+        let apart = a.abs_diff(b);
+        (apart <= 1) | (apart == Self::RADII - 1) | (a.max(b) == Self::RADII)
+    }
 }
 
 impl Task for Geometries<'_> {
@@ -67,17 +83,25 @@ impl Task for Geometries<'_> {
         let Self {
             t,
             points,
-            grid,
             mut first,
             spheres,
             signs,
+            obtuse,
         } = self;
-        for (spheres, signs) in spheres.chunks_mut(4).zip(signs.chunks_mut(4)) {
-            if let (Ok(spheres), Ok(signs)) = (spheres.try_into(), <&mut [Signs; 4]>::try_from(&mut *signs)) {
-                four_geometries(t, points, grid, first, spheres, signs);
+        let fours = spheres
+            .chunks_mut(4)
+            .zip(signs.chunks_mut(4))
+            .zip(obtuse.chunks_mut(4));
+        for ((spheres, signs), obtuse) in fours {
+            if let (Ok(spheres), Ok(signs), Ok(obtuse)) = (
+                spheres.try_into(),
+                <&mut [Signs; 4]>::try_from(&mut *signs),
+                <&mut [u16; 4]>::try_from(&mut *obtuse),
+            ) {
+                four_geometries(t, points, first, spheres, signs, obtuse);
             } else {
                 for k in 0..spheres.len() {
-                    (spheres[k], signs[k]) = one_geometry(t, points, grid, TetId(first + k as u32));
+                    (spheres[k], signs[k], obtuse[k]) = one_geometry(t, points, TetId(first + k as u32));
                 }
             }
             first += 4;
@@ -89,10 +113,10 @@ impl Task for Geometries<'_> {
 fn four_geometries(
     t: &Triangulation,
     points: &[DVec3],
-    grid: Grid,
     first: u32,
     spheres: &mut [Sphere; 4],
     signs: &mut [Signs; 4],
+    obtuse_out: &mut [u16; 4],
 ) {
     // Loops over indices: closures would not be compiled for the wider instructions.
     let mut corners = [[DVec3::ZERO; 4]; 4];
@@ -153,19 +177,15 @@ fn four_geometries(
     for k in 0..4 {
         let tet = TetId(first + k as u32);
         if certain >> k & 1 == 0 {
-            (spheres[k], signs[k]) = one_geometry(t, points, grid, tet);
+            (spheres[k], signs[k], obtuse_out[k]) = one_geometry(t, points, tet);
             continue;
         }
-        let shared = [m.get(k), DVec3::new(det.0[k], reach.0[k], volume.0[k])];
-        let (cospherical, owned) = cospherical(t, points, grid, tet, corners[k], shared, lu.0[k]);
         spheres[k] = Sphere {
             centre: centre.get(k),
             radius: radius.0[k],
         };
-        signs[k] = Signs {
-            signs: outside[k] | cospherical << 4,
-            obtuse: obtuse[k] & owned,
-        };
+        signs[k] = Signs::new(radius.0[k], outside[k]);
+        obtuse_out[k] = obtuse[k];
     }
 }
 
@@ -179,22 +199,10 @@ fn offsets(m: FourVectors, det: Four, volume: Four, lengths: Four) -> (FourVecto
     (m.scale(Four::all(0.5).over(det)), well)
 }
 
-/// [`tet_geometry`] as it is kept.
+/// Geometry of one finite tetrahedron.
 #[cold]
 #[inline(never)]
-fn one_geometry(t: &Triangulation, points: &[DVec3], grid: Grid, tet: TetId) -> (Sphere, Signs) {
-    let g = tet_geometry(t, points, grid, tet);
-    let signs = Signs {
-        signs: g.outside | g.cospherical << 4,
-        obtuse: g.obtuse,
-    };
-    (g.sphere, signs)
-}
-
-/// Geometry of a finite tetrahedron; `points` are those of the triangulation in the frame of the predicates,
-/// `grid` is theirs.
-#[inline(always)]
-pub(super) fn tet_geometry(t: &Triangulation, points: &[DVec3], grid: Grid, tet: TetId) -> TetGeometry {
+fn one_geometry(t: &Triangulation, points: &[DVec3], tet: TetId) -> (Sphere, Signs, u16) {
     let ids = t.tet(tet);
     let corners = ids.map(|v| points[v.index()]);
     let a = corners[0];
@@ -228,72 +236,35 @@ pub(super) fn tet_geometry(t: &Triangulation, points: &[DVec3], grid: Grid, tet:
         outside |= u8::from(sign > 0.0) << k;
     }
 
-    let (cospherical, owned) = cospherical(
-        t,
-        points,
-        grid,
-        tet,
-        corners,
-        [m, DVec3::new(det, reach, volume)],
-        lu,
+    let sphere = circumsphere::tetrahedron_from(corners, m, det, volume, lu + lv + lw);
+    let obtuse = obtuse(corners, [u, v, w], [uu, vv, ww]);
+    (sphere, Signs::new(sphere.radius, outside), obtuse)
+}
+
+/// Whether a point lies on the sphere through four others, exactly; `grid` is theirs.
+pub(super) fn cospherical(grid: Grid, corners: [DVec3; 4], p: DVec3) -> bool {
+    let [a, b, c, d] = corners;
+    let [u, v, w, q] = [b - a, c - a, d - a, p - a];
+    let (uu, vv, ww, qq) = (
+        u.length_squared(),
+        v.length_squared(),
+        w.length_squared(),
+        q.length_squared(),
     );
-    TetGeometry {
-        sphere: circumsphere::tetrahedron_from(corners, m, det, volume, lu + lv + lw),
-        outside,
-        cospherical,
-        obtuse: obtuse(corners, [u, v, w], [uu, vv, ww]) & owned,
-    }
+    let vw = v.cross(w);
+    let m = uu * vw + vv * w.cross(u) + ww * u.cross(v);
+    let [lu, lv, lw, lq] = [uu.sqrt(), vv.sqrt(), ww.sqrt(), qq.sqrt()];
+    let volume = lu * lv * lw;
+    let power = q.dot(m) - qq * u.dot(vw);
+    let bound = ERROR * volume * (lq * (lu + lv + lw) + qq) + UNDERFLOW;
+    power.abs() <= bound
+        && grid
+            .insphere(a, b, c, d, p)
+            .unwrap_or_else(|| insphere(a, b, c, d, p))
+            == 0.0
 }
 
-/// [`TetGeometry::cospherical`], and the mask of the owned facets in [`TetGeometry::obtuse`]; `m` and the numbers after it
-/// (`det`, `reach`, `volume`) and `lu` as in [`tet_geometry`].
-#[inline(always)]
-fn cospherical(
-    t: &Triangulation,
-    points: &[DVec3],
-    grid: Grid,
-    tet: TetId,
-    corners: [DVec3; 4],
-    [m, numbers]: [DVec3; 2],
-    lu: f64,
-) -> (u8, u16) {
-    let a = corners[0];
-    let [det, reach, volume] = numbers.to_array();
-    // Lists grow without branches: which facets are owned cannot be foreseen.
-    let mut owned = [0u8; 5];
-    let mut count = 0;
-    for index in 0..4u8 {
-        let facet = Facet { tet, index };
-        owned[count] = index;
-        count += usize::from(facet < t.mirror(facet));
-    }
-    let mut cospherical = 0;
-    // sqrt(qq) <= (qq / lu + lu) / 2 spares a root.
-    let (half, inverse) = (0.5 * lu, 0.5 / lu);
-    let mut mask = 0u16;
-    for &index in &owned[..count] {
-        mask |= 15 << (4 * index);
-        let other = t.mirror(Facet { tet, index });
-        let beyond = t.tet(other.tet)[other.index as usize];
-        if beyond == INFINITE {
-            continue;
-        }
-        let p = points[beyond.index()];
-        let q = p - a;
-        let qq = q.length_squared();
-        let power = q.dot(m) - qq * det;
-        if power.abs() <= ERROR * ((qq * inverse + half) * reach + qq * volume) + UNDERFLOW {
-            let [a, b, c, d] = corners;
-            let side = grid
-                .insphere(a, b, c, d, p)
-                .unwrap_or_else(|| insphere(a, b, c, d, p));
-            cospherical |= u8::from(side == 0.0) << index;
-        }
-    }
-    (cospherical, mask)
-}
-
-/// [`TetGeometry::obtuse`] for all four facets. With `S` the sum of the three squares every cosine term below is a sum of
+/// [`Geometries::obtuse`] for all four facets. With `S` the sum of the three squares every cosine term below is a sum of
 /// magnitudes of at most `2 S`, each term with fewer than ten roundings, so `ERROR * S` bounds its error.
 #[inline(always)]
 fn obtuse(corners: [DVec3; 4], [u, v, w]: [DVec3; 3], [uu, vv, ww]: [f64; 3]) -> u16 {
