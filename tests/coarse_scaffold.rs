@@ -81,6 +81,11 @@ fn box_and_prism_have_the_counts_derived_by_hand() {
         assert_eq!(counts(&p), [9, 7, 9, 0, 8]);
         check_references(&p);
     }
+    // At a spacing of twice the tolerance: a gap of three spacings at one corner, a crumb cut off by a seam at another.
+    for seed in [4, 5] {
+        let s = scaffold(&shapes::box_shape(1.0, 1.4, 2.0), 5000, seed);
+        assert_eq!(counts(&s), [13, 12, 12, 0, 12]);
+    }
 }
 
 #[test]

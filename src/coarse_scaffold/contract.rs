@@ -11,7 +11,8 @@
 //! 1. seams (merges A1A5, A1A3-II and A1^2A3-I: the end of an axial curve meets a rib or another axial curve);
 //! 2. curves between two different nodes (A1^5 between two A1^4 nodes, A1^2A3-I between an A1^4 and an A1A3 node);
 //! 3. sheets with everything around them (A1^5: the triangle between axial curves; crumbs of the sampling). The ball of the new
-//!    node, the largest there is, must come within the tolerance of every generator of what is shrunk.
+//!    node, the largest there is, must come within the tolerance of every generator of what is shrunk, unless the sheet is below the cut
+//!    and in the graph only because it hangs on a node.
 //!
 //! Costs are lengths: of the path, of the curve, half the extent of the sheet. With [`Cost::Count`] they are numbers of fine
 //! edges and of generators with the thresholds of Chang & Kimia, "Regularizing 3D medial axis using medial scaffold transforms"
@@ -22,6 +23,7 @@ use super::network::Network;
 use super::settings::CoarseScaffoldSettings;
 use crate::fine_scaffold::FineScaffold;
 use crate::fine_scaffold::complex::NONE;
+use crate::regularise::seams::SEAM_SPACINGS;
 use crate::regularise::{Cost, Event, Kind};
 use glam::DVec3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -64,7 +66,7 @@ pub(crate) fn contract(network: &mut Network, settings: &CoarseScaffoldSettings)
     let limit = |length: f64, count: f64| if counts { count } else { length * tau };
     super::hide::hide(network, settings);
     let seams = seams(network, counts);
-    // Below two spacings a seam is all sampling.
+    // A seam of few spacings is all sampling.
     let seam = limit(settings.contract_seam, COUNT_MERGE);
     shrink(
         network,
@@ -72,7 +74,7 @@ pub(crate) fn contract(network: &mut Network, settings: &CoarseScaffoldSettings)
         if counts {
             seam
         } else {
-            seam.max(2.0 * network.fine.scale.spacing_mm)
+            seam.max(SEAM_SPACINGS * network.fine.scale.spacing_mm)
         },
     );
     let curves = curves(network, counts);
@@ -215,7 +217,8 @@ pub(crate) fn shrink_one(network: &mut Network, kind: Kind, new: Cells) -> bool 
         list.sort_unstable();
         list.dedup();
     }
-    if !is_contractible(fine, &all) || kind == Kind::ContractSheet && !ball_covers(network, &all) {
+    let must_cover = kind == Kind::ContractSheet && !super::hide::is_crumb(network, &all.facets);
+    if !is_contractible(fine, &all) || must_cover && !ball_covers(network, &all) {
         return false;
     }
     for root in &roots {

@@ -13,6 +13,7 @@ use super::contract::{Cells, shrink_one};
 use super::hypergraph::CurveKind;
 use super::network::{Chain, Network};
 use super::settings::CoarseScaffoldSettings;
+use crate::fine_scaffold::complex::NONE;
 use crate::regularise::{Event, Kind};
 
 /// Hides whiskers and the axial curves below the cut.
@@ -43,7 +44,7 @@ pub(crate) fn hide(network: &mut Network, settings: &CoarseScaffoldSettings) {
             .filter(|(p, _)| *p < network.regularised.cut)
             .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.edges.cmp(&b.1.edges)));
         let Some((persistence, chain)) = weakest else {
-            return;
+            break;
         };
         let v = chain.vertices[0] as usize;
         let tau = network.regularised.tolerance_at(network.fine.vertex_radius[v]);
@@ -62,6 +63,49 @@ pub(crate) fn hide(network: &mut Network, settings: &CoarseScaffoldSettings) {
             .transforms
             .push(Event::applied(Kind::HideCurve, persistence * tau, place, 0, 0));
     }
+    while drop_seams_of_crumbs(network) {}
+}
+
+/// Drops the first seam that cuts a crumb off a sheet: a piece of less persistence than the cut is none by itself. Returns whether
+/// there was one.
+fn drop_seams_of_crumbs(network: &mut Network) -> bool {
+    let sheets = network.sheets();
+    let mut sheet_of = vec![NONE; network.fine.num_facets()];
+    for (i, facets) in sheets.iter().enumerate() {
+        for &f in facets {
+            sheet_of[f as usize] = i as u32;
+        }
+    }
+    let crumb: Vec<bool> = sheets.iter().map(|s| is_crumb(network, s)).collect();
+    let cuts_off = |path: &Vec<u32>| {
+        path.iter().any(|&e| {
+            let mut sides = network.facets(e).map(|f| sheet_of[f as usize]);
+            let (a, b) = (sides.next(), sides.next());
+            network.seam[e as usize]
+                && a != b
+                && [a, b]
+                    .into_iter()
+                    .flatten()
+                    .any(|s| s != NONE && crumb[s as usize])
+        })
+    };
+    let Some(path) = network.regularised.seams.iter().find(|path| cuts_off(path)) else {
+        return false;
+    };
+    for &e in path {
+        network.seam[e as usize] = false;
+    }
+    true
+}
+
+/// Whether the largest erosion thickness of some facets, in tolerances, is below the cut.
+pub(crate) fn is_crumb(network: &Network, facets: &[u32]) -> bool {
+    facets.iter().all(|&f| {
+        let ring = network.fine.facet_vertices(f as usize);
+        let sum: f64 = ring.iter().map(|&v| network.fine.vertex_radius[v as usize]).sum();
+        let tau = network.regularised.tolerance_at(sum / ring.len() as f64);
+        network.regularised.erosion_mm[f as usize] < network.regularised.cut * tau
+    })
 }
 
 /// Whether a live seam starts at an end of a chain.

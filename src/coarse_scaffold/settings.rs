@@ -19,7 +19,7 @@ pub struct CoarseScaffoldSettings {
 impl Default for CoarseScaffoldSettings {
     fn default() -> Self {
         Self {
-            contract_seam: 2.5,
+            contract_seam: 4.5,
             contract_curve: 0.5,
             contract_sheet: 1.0,
             smoothing: 1.0,

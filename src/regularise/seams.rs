@@ -4,8 +4,9 @@
 //!
 //! A path to the curve's own rib is not a seam: the way along the curves must be much longer than the path.
 //!
-//! Where the scaffold is thick the end of an axial curve has no rib to meet, but it may stop short of another axial curve; the
-//! seam between the two is what later merges them (transitions A1A3-II and A1^2A3-I).
+//! Which two of the three sheets at an end run into each other is decided by the last facets that grew back, so without seams it differs
+//! from sampling to sampling, also where the scaffold is thick; there a seam may meet another axial curve, which is what later
+//! merges the two (transitions A1A3-II and A1^2A3-I).
 
 use super::complex::Complex;
 use super::fins::axial_degree;
@@ -17,8 +18,8 @@ use std::collections::BTreeMap;
 
 /// The way along the curves must be this many times the seam.
 const DETOUR: f64 = 2.5;
-/// Seams may always be this many spacings long.
-const SEAM_SPACINGS: f64 = 2.0;
+/// Seams may always be this many spacings long: at a sampling as coarse as the tolerance the gap is as wide.
+pub(crate) const SEAM_SPACINGS: f64 = 3.0;
 
 /// Finds the seams: paths of edges, each from an axial end to a curve.
 pub(crate) fn find_seams(
@@ -37,16 +38,9 @@ pub(crate) fn find_seams(
         if degree[v as usize] != 1 {
             continue;
         }
-        let at_rib = radius <= settings.seam_radius * tau;
-        let longest = tau
-            * if at_rib {
-                settings.seam_length
-            } else {
-                settings.merge_length
-            };
-        // At a sampling as coarse as the tolerance the gap is as wide as two spacings.
+        let longest = settings.seam_length * tau;
         let longest = longest.max(SEAM_SPACINGS * fine.scale.spacing_mm);
-        let Some(path) = seam_from(complex, &is_seam, v, longest, at_rib) else {
+        let Some(path) = seam_from(complex, &is_seam, v, longest) else {
             continue;
         };
         let length = path
@@ -72,14 +66,8 @@ pub(crate) fn find_seams(
     seams
 }
 
-/// The seam from an axial end: to the nearest curve, ribs among them only `at_rib`.
-fn seam_from(
-    complex: &Complex,
-    is_seam: &[bool],
-    start: u32,
-    longest: f64,
-    at_rib: bool,
-) -> Option<Vec<u32>> {
+/// The seam from an axial end to the nearest curve.
+fn seam_from(complex: &Complex, is_seam: &[bool], start: u32, longest: f64) -> Option<Vec<u32>> {
     let fine = complex.fine;
     let on_curve = |e: u32| complex.edge_count[e as usize] != 2 || is_seam[e as usize];
     let along = distances_along_curves(complex, &on_curve, start, DETOUR * longest);
@@ -97,12 +85,7 @@ fn seam_from(
             .any(|e| complex.edge_alive[e as usize] && on_curve(e));
         if v != start && touches_curve {
             let detour = along.get(&v).copied().unwrap_or(f64::INFINITY);
-            let meets = at_rib
-                || fine.edges_of_vertex(v as usize).any(|e| {
-                    complex.edge_alive[e as usize]
-                        && (complex.edge_count[e as usize] >= 3 || is_seam[e as usize])
-                });
-            if meets && detour > DETOUR * distance {
+            if detour > DETOUR * distance {
                 let mut path = Vec::new();
                 let mut at = v;
                 while let Some(&e) = reached.get(&at) {

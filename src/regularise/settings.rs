@@ -53,12 +53,10 @@ pub struct RegulariseSettings {
     /// Wires are pruned at this many times the threshold of sheets, because the erosion thickness of a curve of finite
     /// sampling overshoots that of a sheet.
     pub wire: f64,
-    /// Seams are sought at ends of axial curves of radius below this many tolerances.
-    pub seam_radius: f64,
-    /// Longest seam, in tolerances.
+    /// Longest seam, in tolerances: a gap between the end of an axial curve and a border that is narrower is closed. Between two
+    /// samplings of 25 bones the number of sheets changes by 12 % with 4.5, 15 % with 4, 21 % with 2.5 where the scaffold is thin and
+    /// none elsewhere.
     pub seam_length: f64,
-    /// Longest path, in tolerances, across which the end of an axial curve is merged with another axial curve, at any radius.
-    pub merge_length: f64,
     /// With [`Cost::Count`]: sheets with fewer generators than this are spliced.
     pub count_threshold: u32,
 }
@@ -79,9 +77,7 @@ impl Default for RegulariseSettings {
             fringe_erosion: 0.5,
             rounds: 3,
             wire: 1.15,
-            seam_radius: 5.0,
-            seam_length: 2.5,
-            merge_length: 2.5,
+            seam_length: 4.5,
             count_threshold: 100,
         }
     }
@@ -140,14 +136,12 @@ impl RegulariseSettings {
         positive("splice", self.splice)?;
         positive("slight_move", self.slight_move)?;
         positive("slight_erosion", self.slight_erosion)?;
-        positive("merge_length", self.merge_length)?;
         positive("splice_spacings", self.splice_spacings)?;
         positive("grow_back", self.grow_back)?;
         positive("grow_back_axial", self.grow_back_axial)?;
         positive("fringe_width", self.fringe_width)?;
         positive("fringe_erosion", self.fringe_erosion)?;
         positive("wire", self.wire)?;
-        positive("seam_radius", self.seam_radius)?;
         positive("seam_length", self.seam_length)
     }
 }
