@@ -2,7 +2,7 @@
 # Races the reconstruction of raw clouds against CGAL's advancing front and Open3D's Poisson and ball pivoting, each on the
 # raw cloud and on the one this project de-noised.
 # usage: compare/reconstruction.sh [N [NOISE,NOISE... [SEEDS]]]          needs g++, libcgal-dev
-# Open3D: python -m venv venv && venv/bin/pip install numpy addict && venv/bin/pip install --no-deps open3d-cpu==0.19.0,
+# Open3D: python -m venv venv && venv/bin/pip install open3d-cpu==0.19.0 (with its dependencies: it imports them all),
 # then PYTHON=venv/bin/python compare/reconstruction.sh. Prints one line a noise level, method and input.
 set -eu
 cd "$(dirname "$0")/.."

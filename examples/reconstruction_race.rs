@@ -1,4 +1,4 @@
-//! Clouds for other reconstructors, and a judge of what they make of them; `compare/reconstruction.py` runs the race.
+//! Clouds for other reconstructors, and a judge of what they make of them; `compare/reconstruction.sh` runs the race.
 //!
 //! ```text
 //! cargo run --release --example reconstruction_race -- dump FOLDER [N [NOISE,NOISE... [SEEDS]]]
@@ -149,14 +149,16 @@ fn judge(folder: &Path) -> Result<(), Failure> {
     println!("|---|---|---|---|---|---|---|---|");
     for ((noise, method), line) in &mut lines {
         println!(
-            "| {noise} | {method} | {} | {} | {} | {:.2}, {:.2} | {:.2} ({}) | {:.2} |",
+            "| {noise} | {method} | {} | {} | {} | {:.2}, {:.2} | {} | {:.2} |",
             line.right,
             line.near,
             line.runs,
             median(&mut line.hausdorff),
             line.hausdorff.last().copied().unwrap_or(f64::NAN),
-            median(&mut line.volume),
-            line.volume.len(),
+            match line.volume.len() {
+                0 => "all open".to_owned(),
+                n => format!("{:.2} ({n})", median(&mut line.volume)),
+            },
             median(&mut line.seconds),
         );
     }

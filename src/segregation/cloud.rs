@@ -22,7 +22,7 @@ use super::gap_transforms::gap_transforms;
 use super::labels::{Segregation, boundary_triangles};
 use super::openness::{area_share, patches, rims, unsupported};
 use super::orient::orient;
-use super::prepare::{Cleaned, Prepared, Strength, clean, thin_out};
+use super::prepare::{Cleaned, PrepareReport, Prepared, Strength, clean, thin_out};
 use super::report::{ClosingReport, CloudReport, ComponentReport, Decision, SecondOpinion, Variation};
 use super::self_check::{doubts, pull_opinions, self_check};
 use crate::delaunay::{Facet, Triangulation};
@@ -76,7 +76,8 @@ pub struct SegregationSettings {
     /// quarter of the spacing.
     pub open_area_share: f64,
     /// The same for clouds whose noise reaches [`Self::second_opinion_noise`], of which right closed surfaces have up to
-    /// 1.9 %.
+    /// 1.9 %, and for those that lost more than 1 % of their points as outliers (up to 2.2 %: with outliers go points of
+    /// thin parts).
     pub noisy_open_area_share: f64,
     /// Least share of the points a component must touch; smaller ones are islands.
     pub least_component_share: f64,
@@ -101,9 +102,10 @@ impl Default for SegregationSettings {
 }
 
 impl SegregationSettings {
-    /// The share from which a cloud of this noise over spacing is open.
-    fn threshold(&self, noise_over_spacing: f64) -> f64 {
-        if noise_over_spacing < self.second_opinion_noise {
+    /// The share from which a cloud prepared like this is open.
+    fn threshold(&self, prepared: &PrepareReport) -> f64 {
+        let few_outliers = prepared.outliers as f64 <= MANY_OUTLIERS * prepared.points as f64;
+        if few_outliers && prepared.noise_over_spacing < self.second_opinion_noise {
             self.open_area_share
         } else {
             self.noisy_open_area_share
@@ -298,7 +300,7 @@ fn close_prepared(
         preset,
     };
     let share = settings.least_component_share;
-    let threshold = settings.threshold(prepared.report.noise_over_spacing);
+    let threshold = settings.threshold(&prepared.report);
     let mut first = close(&prepared.points, &prepared.spacing_mm, &closing)?;
     prefer_supported(&mut first, threshold, settings);
     let judged = Judged::new(&first, &BTreeSet::new());
@@ -332,6 +334,8 @@ fn prefer_supported(closure: &mut Closure, threshold: f64, settings: &Segregatio
     }
 }
 
+/// Share of the points beyond which outliers were no exception.
+const MANY_OUTLIERS: f64 = 0.01;
 /// Share of the threshold from which unsupported area is looked into.
 const SUSPICIOUS: f64 = 0.5;
 
@@ -441,7 +445,7 @@ fn finish(
         opinions,
     } = chosen;
     let judged = Judged::new(&closure, known);
-    let decision = judged.decide(settings.threshold(prepared.report.noise_over_spacing), settings);
+    let decision = judged.decide(settings.threshold(&prepared.report), settings);
     let mut report = CloudReport {
         prepare: prepared.report.clone(),
         second_opinions: opinions,
