@@ -77,7 +77,7 @@ impl Frame {
     /// The frame of finite points, or the error that says which of them spans too wide a range. Clouds of ordinary
     /// magnitude (coordinates and their last bits between `2^BOTTOM` and `2^TOP`) are left as they are.
     pub fn of(points: &[DVec3]) -> Result<Self, DelaunayError> {
-        if points.iter().all(|p| is_ordinary(*p)) {
+        if points.par_iter().all(|p| is_ordinary(*p)) {
             return Ok(Self { exponent: 0 });
         }
         let [lo, hi] = exponents(points);
@@ -205,7 +205,7 @@ pub fn prepare(points: &[DVec3]) -> Result<Generators, DelaunayError> {
         return Ok(out);
     }
     out.source = vec![0; points.len()];
-    for i in lexicographic_order(points) {
+    for i in lexicographic_order(points).collect::<Vec<_>>() {
         let p = points[i as usize] + DVec3::ZERO;
         if out.points.last() != Some(&p) {
             out.points.push(p);
@@ -226,14 +226,14 @@ pub(super) fn distinct(points: &[DVec3]) -> Result<Vec<DVec3>, DelaunayError> {
     }
     // Adding zero turns -0.0 into 0.0 and leaves every other number as it is.
     let mut out: Vec<DVec3> = Vec::with_capacity(points.len());
-    out.extend(lexicographic_order(points).map(|i| points[i as usize] + DVec3::ZERO));
+    out.par_extend(lexicographic_order(points).map(|i| points[i as usize] + DVec3::ZERO));
     out.dedup();
     Ok(out)
 }
 
 /// Indices of finite points in lexicographic order, equal points in order of their indices: by the leading bits of x as whole
 /// numbers, then in full where those agree.
-fn lexicographic_order(points: &[DVec3]) -> impl Iterator<Item = u32> {
+fn lexicographic_order(points: &[DVec3]) -> impl IndexedParallelIterator<Item = u32> {
     let index_bits = usize::BITS - points.len().leading_zeros();
     let cells = ((1u64 << (u64::BITS - index_bits)) - 1) as f64 * 0.5;
     let lo = points.iter().fold(f64::INFINITY, |m, p| m.min(p.x));
@@ -242,7 +242,12 @@ fn lexicographic_order(points: &[DVec3]) -> impl Iterator<Item = u32> {
     // Rounding is monotonic. Ranges beyond f64 make all keys equal or extreme, which is correct as well.
     let key = |x: f64| (((x - lo) * factor).min(cells) as u64) << index_bits;
     let mut keys: Vec<u64> = room(points.len());
-    keys.extend(points.iter().zip(0u64..).map(|(p, i)| key(p.x) | i));
+    keys.par_extend(
+        points
+            .par_iter()
+            .zip(0..points.len() as u32)
+            .map(|(p, i)| key(p.x) | u64::from(i)),
+    );
     radix_sort(&mut keys, index_bits);
     let index = move |k: u64| (k & ((1 << index_bits) - 1)) as u32;
     for run in keys.chunk_by_mut(|a, b| a >> index_bits == b >> index_bits) {
@@ -253,7 +258,7 @@ fn lexicographic_order(points: &[DVec3]) -> impl Iterator<Item = u32> {
             });
         }
     }
-    keys.into_iter().map(index)
+    keys.into_par_iter().map(index)
 }
 
 /// Strictly increasing, so distinct too.
@@ -268,7 +273,7 @@ fn check(points: &[DVec3]) -> Result<(), DelaunayError> {
             limit: MAX_POINTS,
         });
     }
-    if points.iter().all(|p| is_ordinary(*p)) {
+    if points.par_iter().all(|p| is_ordinary(*p)) {
         return Ok(());
     }
     let bad = |p: &DVec3| p.to_array().into_iter().find(|v| !v.is_finite());

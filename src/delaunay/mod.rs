@@ -30,6 +30,7 @@ use filter::Filter;
 use glam::DVec3;
 use insertion::{Inserter, Memory};
 use lanes::{Lanes, Site, Task, with_lanes};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use store::Plain;
@@ -74,10 +75,12 @@ pub fn delaunay(points: &[DVec3], settings: &DelaunaySettings) -> Result<Triangu
     // In memory that goes back to the system before the renumbering.
     let mut sites = canonical::room(normalised.len());
     let mut indices = canonical::room(normalised.len());
-    for (i, position) in order.iter() {
-        sites.push(Site::new(normalised[i as usize], position));
-        indices.push(i);
-    }
+    sites.par_extend(
+        order
+            .par_iter()
+            .map(|(i, position)| Site::new(normalised[i as usize], position)),
+    );
+    indices.par_extend(order.par_iter().map(|(i, _)| i));
     let ends = order.ends;
     drop(normalised);
     let first = match first_simplex(&sites) {

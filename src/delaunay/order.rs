@@ -62,8 +62,8 @@ pub(super) fn insertion_order(points: &[DVec3], bounds: [DVec3; 2]) -> Insertion
 
 impl InsertionOrder {
     /// Indices of the points in insertion order, each with its position on the curve.
-    pub(super) fn iter(&self) -> impl Iterator<Item = (u32, f64)> + '_ {
-        self.keys.iter().map(|k| {
+    pub(super) fn par_iter(&self) -> impl IndexedParallelIterator<Item = (u32, f64)> + '_ {
+        self.keys.par_iter().map(|k| {
             let position = k >> self.index_bits & ((1 << self.position_bits) - 1);
             ((k & ((1 << self.index_bits) - 1)) as u32, position as f64)
         })
@@ -236,7 +236,7 @@ mod tests {
             .collect();
         let inserted = insertion_order(&points, [DVec3::ZERO, DVec3::splat(3000.0)]);
         assert!(inserted.ends.len() == 2 && inserted.ends[1] == 3000);
-        let (mut order, positions): (Vec<u32>, Vec<f64>) = inserted.iter().unzip();
+        let (mut order, positions): (Vec<u32>, Vec<f64>) = inserted.par_iter().unzip();
         for round in [0..inserted.ends[0] as usize, inserted.ends[0] as usize..3000] {
             assert!(positions[round].is_sorted());
         }

@@ -128,9 +128,10 @@ impl Store for Worker<'_> {
 
     #[inline(always)]
     fn owns(&self, sites: &[Site], v: [u32; 4]) -> bool {
-        // A slot being written by another thread holds vertices of that thread, old or new.
-        let holds = |v: u32| sites.get(v as usize).is_some_and(|s| self.stretch.holds(s));
-        v.into_iter().map(|v| u8::from(holds(v))).sum::<u8>() >= 3
+        // A slot being written by another thread holds vertices of that thread, old or new. Spelled out: an iterator's
+        // closure would be compiled apart and called for every neighbour.
+        let [a, b, c, d] = v;
+        self.holds(sites, a) + self.holds(sites, b) + self.holds(sites, c) + self.holds(sites, d) >= 3
     }
 
     #[inline(always)]
@@ -177,6 +178,15 @@ impl Store for Worker<'_> {
 }
 
 impl Worker<'_> {
+    /// 1 when a vertex is on this thread's stretch; the infinite one never is.
+    #[inline(always)]
+    fn holds(&self, sites: &[Site], v: u32) -> u8 {
+        match sites.get(v as usize) {
+            Some(site) => u8::from(self.stretch.holds(site)),
+            None => 0,
+        }
+    }
+
     /// Takes slots from the common store; `false` when there are none.
     #[cold]
     fn take_slots(&mut self, needed: usize) -> bool {
