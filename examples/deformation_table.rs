@@ -42,16 +42,19 @@ enum Change {
     Density(f64),
 }
 
-const ROWS: [(&str, Change); 18] = [
+const ROWS: [(&str, Change); 21] = [
     ("re-sampled", Change::Nothing),
     ("noise 0.5 spacing", Change::Noise(0.5)),
     ("noise 1 spacing", Change::Noise(1.0)),
     ("warp 1 %", Change::Warp(0.01)),
     ("warp 2 %", Change::Warp(0.02)),
+    ("warp 5 %", Change::Warp(0.05)),
+    ("warp 8 %", Change::Warp(0.08)),
     ("bend 0.2", Change::Bend(0.2)),
     ("size 0.8", Change::Size(0.8)),
     ("size 1.2", Change::Size(1.2)),
     ("growth 5 %", Change::Growth(0.05)),
+    ("growth 10 %", Change::Growth(0.1)),
     ("missing ball 15 %", Change::Missing(0.15)),
     ("three cuts to 60 %", Change::Cuts(0.6)),
     ("three cuts to 40 %", Change::Cuts(0.4)),
@@ -80,7 +83,7 @@ fn main() {
 
 fn row(name: &str, change: Change, most: usize) {
     let shapes: Vec<Shape> = if name.starts_with("thin plate") {
-        vec![plate()]
+        (0..most).map(plate).collect()
     } else {
         bones::all(0).into_iter().take(most).collect()
     };
@@ -124,6 +127,12 @@ fn row(name: &str, change: Change, most: usize) {
         extra.push(distance(&found.T_target_source) - distance(&truth));
         if error < 5.0 {
             right_flagged += usize::from(found.ambiguous);
+            if found.ambiguous {
+                println!(
+                    "<!-- {name}, {}: right, {:?}, {:?} -->",
+                    shape.name, found.method, found.ambiguity
+                );
+            }
         } else {
             wrong_flagged += usize::from(found.ambiguous);
             println!(
@@ -183,16 +192,19 @@ fn changed(change: Change, shape: &Shape, warp: &Warp, seed: u64) -> Vec<DVec3> 
     }
 }
 
-/// A curved plate, 40 x 25 x 1.5 mm with one bump: the walls are a thirtieth of the diagonal apart.
-fn plate() -> Shape {
+/// A curved plate, 20 x 14 x 1 mm, with one bump: the walls are a twenty-fifth of the diagonal apart. Curvature, place and
+/// height of the bump change with `k`.
+fn plate(k: usize) -> Shape {
     let mut plate = datasets_synthetic::ShapeKind::Slab
         .shape(0)
         .expect("a single shape");
     let bounds = plate.bounds();
     let size = bounds.size();
-    plate = plate.warped(&Warp::bend_x(0.8 / size.x));
-    let end = bounds.centre() + 0.3 * size * DVec3::new(1.0, 0.6, 0.0);
-    plate.warped(&Warp::swelling(end, 0.15 * size.x, 0.1 * size.x))
+    let t = k as f64;
+    plate = plate.warped(&Warp::bend_x((0.8 - 0.07 * t) / size.x));
+    let place = DVec3::new((1.0 + t).cos(), (1.0 + 2.0 * t).sin(), 0.0);
+    let end = bounds.centre() + 0.35 * size * place;
+    plate.warped(&Warp::swelling(end, 0.15 * size.x, (0.1 + 0.01 * t) * size.x))
 }
 
 /// The motion (or similarity) that brings `from` onto `to` in the least squares sense.

@@ -1,8 +1,8 @@
 //! Prints how whole bones of two persons are laid on each other.
 //!
 //! `cargo run --release --example persons_table -- [PAIRS] [SET...]` with `../shared/data` (or the folder in `MEDIAL_DATA`); sets:
-//! `wrists` (one wrist on another one's, right and mirrored left), `sides` (tarsals, left mirrored), `knees` (individuals of a shape
-//! model with known correspondences), `population` (synthetic individuals, known correspondences; needs no data).
+//! `wrists` (one wrist on another one's, right and mirrored left), `sides` (tarsals, left mirrored), `knees` and `patellas`
+//! (individuals of a shape model with known correspondences), `population` (synthetic individuals, known correspondences; needs no data).
 //!
 //! Each pair is registered from three random poses with three seeds. The peer is four flips of the principal axes and wide
 //! point-to-point ICP on exact nearest places, symmetric and untruncated. Columns: pairs whose symmetric rms exceeds 1.05 times
@@ -41,10 +41,11 @@ fn main() {
         "| set | pairs | rms > 1.05 peer | worst ratio | median rms % diag | three answers agree | right | right, ambiguous | wrong, ambiguous | median s |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|");
-    let sets: [(&str, Make); 4] = [
+    let sets: [(&str, Make); 5] = [
         ("wrists", wrists),
         ("sides", sides),
-        ("knees", knees),
+        ("knees", |data| of_model(data, &[("Femur", 4), ("Tibia", 4)])),
+        ("patellas", |data| of_model(data, &[("Patella", 20)])),
         ("population", |_| individuals()),
     ];
     for (name, make) in sets {
@@ -349,10 +350,11 @@ fn sides(data: &Path) -> Vec<Pair> {
     bones.iter().filter_map(pair).collect()
 }
 
-fn knees(data: &Path) -> Vec<Pair> {
+/// Individuals of the shape model: bones and how many of each.
+fn of_model(data: &Path, bones: &[(&str, usize)]) -> Vec<Pair> {
     let folder = data.join("knee_ssm_synthetic_localonly");
     let mut out = Vec::new();
-    for (bone, count) in [("Femur", 4), ("Tibia", 4), ("Patella", 20)] {
+    for &(bone, count) in bones {
         let all: Vec<(usize, TriangleMesh)> = (1..=count)
             .filter_map(|k| {
                 let file = folder.join(format!("S{k:03}_{bone}.ply"));

@@ -3,6 +3,7 @@
 //! `cargo run --release --example registration_table -- [TRIALS] [CASE...]` with the bones of `../shared/data` (or of the folder
 //! in `MEDIAL_DATA`); cases: whole, crop50, crop50-low, crop50-high, overlap33, overlap20, one55, one35, one25, mesh, mirror.
 //! `... -- TRIALS dump FOLDER CASE...` writes the clouds of the trials, raw and de-noised, for `compare/registration.py`.
+//! `each` prints the error of every trial as well.
 //! Every trial takes one bone, samples it twice independently (4 000 points as target, 2 000 as source), cuts, adds noise in
 //! percent of the whole bone's diagonal, and turns the source by a uniform random rotation.
 
@@ -208,6 +209,10 @@ fn run(case: &Case, bones: &[Bone], trials: usize) {
         } else {
             right_flagged += usize::from(found.ambiguous);
         }
+    }
+    if std::env::args().any(|a| a == "each") {
+        let each: Vec<String> = errors.iter().map(|e| format!("{e:.2}")).collect();
+        println!("<!-- {}: {} -->", case.name, each.join(" "));
     }
     errors.sort_by(f64::total_cmp);
     seconds.sort_by(f64::total_cmp);

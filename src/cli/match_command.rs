@@ -12,7 +12,7 @@ use medial_scaffold::geometry::{Rigid, TriangleMesh};
 use medial_scaffold::pipeline::{MatchRun, MatchSettings, match_shapes};
 use medial_scaffold::registration::{Extent, Mirror};
 use medial_scaffold::reports::{
-    CorrespondenceLine, PlyEncoding, Quantity, Scene, VertexField, colour, glb_bytes, match_report,
+    CorrespondenceLine, PlyEncoding, Quantity, Report, Scene, VertexField, colour, glb_bytes, match_report,
     write_bytes, write_json, write_ply, write_tables, write_tfm,
 };
 use std::path::{Path, PathBuf};
@@ -179,7 +179,18 @@ pub fn write_files(
         &dir.join("T_target_source.tfm"),
         &done.registration.T_target_source,
     )?;
-    let scene = scene(done);
+    record.write(dir)?;
+    let title = format!("{} on {}", done.source.name, done.target.name);
+    let report = match_report(&title, &json(&document)?, &json(record)?, scene(done))?;
+    // The page draws its picture while the surfaces are written.
+    let (surfaces, page) = rayon::join(
+        || write_surfaces(dir, done, &report.scene),
+        || write_page(dir, &report, common),
+    );
+    surfaces.and(page)
+}
+
+fn write_surfaces(dir: &Path, done: &MatchRun, scene: &Scene) -> Result<(), Failure> {
     if let Some(moved) = moved_source(done) {
         write_ply(&dir.join("moved.ply"), &moved, &[], PlyEncoding::default())?;
     }
@@ -192,11 +203,12 @@ pub fn write_files(
             PlyEncoding::default(),
         )?;
     }
-    write_bytes(&dir.join("scene.glb"), glb_bytes(&scene))?;
-    record.write(dir)?;
-    let title = format!("{} on {}", done.source.name, done.target.name);
-    let report = match_report(&title, &json(&document)?, &json(record)?, scene)?;
-    write_tables(dir, &report)?;
+    write_bytes(&dir.join("scene.glb"), glb_bytes(scene))?;
+    Ok(())
+}
+
+fn write_page(dir: &Path, report: &Report, common: &Common) -> Result<(), Failure> {
+    write_tables(dir, report)?;
     if !common.no_report {
         write_bytes(&dir.join("report.html"), report.html()?)?;
     }

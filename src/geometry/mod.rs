@@ -11,6 +11,7 @@ pub mod length;
 pub mod mesh;
 pub mod neighbours;
 pub mod predicates;
+pub mod pseudonormals;
 pub mod rigid;
 pub mod winding;
 
@@ -20,5 +21,6 @@ pub use ids::{CurveId, NodeId, SheetId, TetId, VertexId};
 pub use length::{Length, LengthError, LengthScale};
 pub use mesh::{MeshTopology, TriangleMesh};
 pub use neighbours::{Neighbour, Neighbours};
+pub use pseudonormals::Pseudonormals;
 pub use rigid::Rigid;
 pub use winding::WindingNumber;

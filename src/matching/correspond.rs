@@ -100,8 +100,10 @@ fn run(
         pose,
         reach_mm: settings.reach * 0.5 * (target.diagonal_mm + source.diagonal_mm),
     });
-    let assigned = pair.assign_and_edit(placement, &settings);
-    let shape_distance = pair.shape_distance(&fits, &settings);
+    let (assigned, shape_distance) = rayon::join(
+        || pair.assign_and_edit(placement, &settings),
+        || pair.shape_distance(&fits, &settings),
+    );
     let (correspondences, edit) = match &assigned {
         Some(a) => {
             let path = edit_path(&a.distance, &pair.first, &pair.second, pair.turned);

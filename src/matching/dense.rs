@@ -6,7 +6,8 @@
 //!    corresponding nodes and curves.
 //! 2. Iterative closest points in four dimensions: a rigid motion changes no radius, so the radius tells where in a sheet a point is
 //!    although the sheet is flat there. Both directions, least squares by Kabsch.
-//! 3. Guesses are ranked by residual after a short run on few points; the best eight finish on all.
+//! 3. Guesses are ranked by residual after a short run on 200 points; the best eight run on 500; of these the first two, which decide the
+//!    pose and whether it is ambiguous, come to rest on all points, and the others are only measured on them.
 //!
 //! Measured with moments and this alignment alone: 96 to 100 % of tarsals within 5 degrees, the disc-like patella the exception.
 //! Cost: some 0.1 s.
@@ -28,6 +29,8 @@ pub(crate) struct DenseFit {
     pub(crate) residual: f64,
 }
 
+/// Poses that come to rest on all points: the best one and its rival.
+const DECISIVE: usize = 2;
 /// Poses nearer than this are one, degrees.
 const SAME_POSE_DEG: f64 = 8.0;
 
@@ -102,13 +105,23 @@ pub(crate) fn align(
         .collect();
     rank(&mut fits);
     fits.truncate(keep.max(8));
-    let all = (Side::new(target, usize::MAX), Side::new(source, usize::MAX));
+    let some = (Side::new(target, 500), Side::new(source, 500));
     let mut fits: Vec<DenseFit> = fits
         .into_par_iter()
-        .map(|f| run(&all.0, &all.1, f.pose, 80, scale))
+        .map(|f| run(&some.0, &some.1, f.pose, 40, scale))
         .collect();
     rank(&mut fits);
     fits.truncate(keep);
+    let all = (Side::new(target, usize::MAX), Side::new(source, usize::MAX));
+    let mut fits: Vec<DenseFit> = fits
+        .into_par_iter()
+        .enumerate()
+        .map(|(k, f)| {
+            let iterations = if k < DECISIVE { 80 } else { 1 };
+            run(&all.0, &all.1, f.pose, iterations, scale)
+        })
+        .collect();
+    rank(&mut fits);
     fits
 }
 

@@ -4,6 +4,7 @@ use crate::geometry::TriangleMesh;
 use crate::geometry::closest::ClosestOnMesh;
 use glam::DVec3;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use std::sync::Arc;
 
 /// A place on a surface nearest to a query.
 #[derive(Clone, Copy, Debug)]
@@ -13,17 +14,22 @@ pub(crate) struct Touch {
     pub(crate) normal: DVec3,
 }
 
-/// A surface that answers nearest-place queries.
-pub(crate) enum ExactSurface {
+/// A surface that answers nearest-place queries. Its mirror image shares the index: queries are mirrored instead.
+#[derive(Clone)]
+pub(crate) struct ExactSurface {
+    kind: Arc<Kind>,
+    mirrored: bool,
+}
+
+enum Kind {
     /// Triangles in a bounding volume hierarchy, with their normals.
     Mesh {
-        mesh: TriangleMesh,
-        index: Box<ClosestOnMesh>,
+        index: ClosestOnMesh,
         normals: Vec<DVec3>,
     },
     /// Discs of radius `reach` about oriented points: the distance does not feel where on the surface the samples fell.
     Discs {
-        tree: Box<PointTree>,
+        tree: PointTree,
         points: Vec<DVec3>,
         normals: Vec<DVec3>,
         reach: f64,
@@ -55,22 +61,64 @@ impl PointTree {
 
 impl ExactSurface {
     /// Triangles with their outward unit normals; `None` without triangles.
-    pub(crate) fn of_mesh(mesh: TriangleMesh, normals: Vec<DVec3>) -> Option<Self> {
-        let index = Box::new(ClosestOnMesh::new(&mesh)?);
-        Some(ExactSurface::Mesh { mesh, index, normals })
+    pub(crate) fn of_mesh(mesh: &TriangleMesh, normals: Vec<DVec3>) -> Option<Self> {
+        let index = ClosestOnMesh::new(mesh)?;
+        Some(Self::new(Kind::Mesh { index, normals }))
+    }
+
+    /// Discs of radius `reach` about oriented points; `None` without points.
+    pub(crate) fn of_discs(points: &[DVec3], normals: &[DVec3], reach: f64) -> Option<Self> {
+        Some(Self::new(Kind::Discs {
+            tree: PointTree::new(points)?,
+            points: points.to_vec(),
+            normals: normals.to_vec(),
+            reach,
+        }))
+    }
+
+    fn new(kind: Kind) -> Self {
+        Self {
+            kind: Arc::new(kind),
+            mirrored: false,
+        }
+    }
+
+    /// The surface with `x -> -x`.
+    pub(crate) fn mirror_image(&self) -> Self {
+        Self {
+            kind: Arc::clone(&self.kind),
+            mirrored: !self.mirrored,
+        }
     }
 
     /// Nearest place to `q`.
     pub(crate) fn touch(&self, q: DVec3) -> Touch {
+        if self.mirrored {
+            let touch = self.kind.touch(flip(q));
+            return Touch {
+                place: flip(touch.place),
+                normal: flip(touch.normal),
+            };
+        }
+        self.kind.touch(q)
+    }
+}
+
+fn flip(p: DVec3) -> DVec3 {
+    DVec3::new(-p.x, p.y, p.z)
+}
+
+impl Kind {
+    fn touch(&self, q: DVec3) -> Touch {
         match self {
-            ExactSurface::Mesh { index, normals, .. } => {
+            Kind::Mesh { index, normals } => {
                 let found = index.closest(q);
                 Touch {
                     place: found.point,
                     normal: normals[found.triangle as usize],
                 }
             }
-            ExactSurface::Discs {
+            Kind::Discs {
                 tree,
                 points,
                 normals,

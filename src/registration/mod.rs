@@ -3,7 +3,8 @@
 //! In: two [`RegistrationShape`]s in any pose (surface mesh or cloud, optionally the coarse scaffold). Out: a
 //! [`Registration`]: `T_target_source`, how well it fits, what else it could be, which motions are loose.
 //!
-//! 1. [`oriented`](self): both surfaces become oriented samples; raw clouds are de-noised.
+//! 1. [`oriented`](self): both surfaces become oriented samples; raw clouds lose what lies alone
+//!    and are de-noised.
 //! 2. Whole shapes: first guesses from moments and scaffolds, refined on the surfaces, symmetric distance decides.
 //! 3. Partial shapes, when the surfaces ask for it: poses from oriented point pairs, free space decides.
 //! 4. Ambiguity, conditioning and overlap of the chosen pose.
@@ -11,7 +12,7 @@
 //! | file | idea |
 //! |---|---|
 //! | `shape`, `settings`, `result` | what goes in and what comes out |
-//! | `oriented`, `denoise`, `cells`, `nearest_grid`, `exact` | a surface prepared for search |
+//! | `oriented`, `isolated`, `denoise`, `cells`, `nearest_grid`, `exact` | a surface prepared for search |
 //! | `surface` | whole shapes |
 //! | `partial`, `pairs` | partial shapes |
 //! | `score`, `refine`, `solve` | shared by both: free space, closest points, one linear step |
@@ -25,6 +26,7 @@ mod cells;
 mod denoise;
 pub mod difference;
 mod exact;
+mod isolated;
 mod nearest_grid;
 mod oriented;
 mod pairs;

@@ -26,6 +26,8 @@ const CELL: f64 = 0.02;
 const MARGIN: f64 = 0.25;
 /// Most raw points that take part in de-noising: more do not improve 4 000 wanted ones and cost time.
 const MOST_RAW: usize = 20_000;
+/// Most vertices kept for the largest distance.
+const MOST_VERTICES: usize = 5_000;
 
 /// One surface, prepared.
 pub(crate) struct View {
@@ -39,7 +41,7 @@ pub(crate) struct View {
     pub(crate) tree: PointTree,
     pub(crate) exact: ExactSurface,
     pub(crate) moments: Moments,
-    /// The mesh's own vertices (no more than 20 000), for the largest distance.
+    /// The mesh's own vertices (no more than [`MOST_VERTICES`]), for the largest distance.
     pub(crate) vertices: Vec<DVec3>,
     /// No border was found.
     pub(crate) closed: bool,
@@ -115,9 +117,9 @@ impl View {
                 (b - a).cross(c - a).normalize() * sign
             })
             .collect();
-        let step = mesh.points.len().div_ceil(20_000).max(1);
+        let step = mesh.points.len().div_ceil(MOST_VERTICES).max(1);
         let vertices = mesh.points.iter().copied().step_by(step).collect();
-        let exact = ExactSurface::of_mesh(mesh, face_normals);
+        let exact = ExactSurface::of_mesh(&mesh, face_normals);
         Self::assemble(points, normals, border, spacing, exact, vertices, 0.0, centre)
     }
 
@@ -159,12 +161,8 @@ impl View {
         centre: DVec3,
     ) -> Self {
         let tree = || PointTree::new(&points).expect("the shape was checked: finite, non-empty points");
-        let exact = exact.unwrap_or_else(|| ExactSurface::Discs {
-            tree: Box::new(tree()),
-            points: points.clone(),
-            normals: normals.clone(),
-            reach: spacing,
-        });
+        let discs = || ExactSurface::of_discs(&points, &normals, spacing).expect("as above");
+        let exact = exact.unwrap_or_else(discs);
         let seen = border.iter().filter(|b| **b).count();
         Self {
             grid: NearestGrid::new(&points, CELL, MARGIN),
@@ -188,22 +186,13 @@ impl View {
         let flip = |p: &DVec3| DVec3::new(-p.x, p.y, p.z);
         let points: Vec<DVec3> = self.points.iter().map(flip).collect();
         let normals: Vec<DVec3> = self.normals.iter().map(flip).collect();
-        let exact = match &self.exact {
-            ExactSurface::Mesh { mesh, normals, .. } => {
-                let mut image = mesh.clone();
-                image.points.iter_mut().for_each(|p| *p = flip(p));
-                image.flip();
-                ExactSurface::of_mesh(image, normals.iter().map(flip).collect())
-            }
-            ExactSurface::Discs { .. } => None,
-        };
         let vertices = self.vertices.iter().map(flip).collect();
         let mut image = Self::assemble(
             points,
             normals,
             self.border.clone(),
             self.spacing,
-            exact,
+            Some(self.exact.mirror_image()),
             vertices,
             self.noise,
             self.centre,

@@ -218,29 +218,3 @@ fn thin(fits: Vec<PartialFit>, degrees: f64, shift: f64, count: usize) -> Vec<Pa
     }
     out
 }
-
-/// Lets the final pose come to rest: exact nearest points at the narrowest tolerance until the step vanishes. Says whether it
-/// did.
-pub(crate) fn settle(source: &View, target: &View, pose: Rigid) -> (Rigid, bool) {
-    // After de-noising about a third of the noise is left, and Tukey's weight wants four of that.
-    let tolerance = (1.5 * source.noise.max(target.noise)).max(0.015);
-    let level = Level {
-        iterations: 1,
-        from: tolerance,
-        to: tolerance,
-        count: 4000,
-        exact: true,
-        cosine: 0.6,
-    };
-    let rest = 1e-3 * source.spacing.min(target.spacing);
-    let mut pose = pose;
-    for _ in 0..20 {
-        let next = refine(source, target, pose, level, false);
-        let moved = next.translation.distance(pose.translation) + next.rotation_angle_deg(&pose).to_radians();
-        pose = next;
-        if moved < rest {
-            return (pose, true);
-        }
-    }
-    (pose, false)
-}

@@ -56,6 +56,31 @@ pub(crate) fn refine(source: &View, target: &View, pose: Rigid, level: Level, sc
     pose
 }
 
+/// Lets a final pose come to rest: pairs from the kd-tree at the narrowest tolerance until the step vanishes. Says whether it did.
+pub(crate) fn rest(source: &View, target: &View, pose: Rigid, scale: bool) -> (Rigid, bool) {
+    // After de-noising about a third of the noise is left, and Tukey's weight wants four of that.
+    let tolerance = (1.5 * source.noise.max(target.noise)).max(0.015);
+    let level = Level {
+        iterations: 1,
+        from: tolerance,
+        to: tolerance,
+        count: 4000,
+        exact: true,
+        cosine: 0.6,
+    };
+    let rest = 1e-3 * source.spacing.min(target.spacing);
+    let mut pose = pose;
+    for _ in 0..20 {
+        let next = refine(source, target, pose, level, scale);
+        let moved = next.translation.distance(pose.translation) + next.rotation_angle_deg(&pose).to_radians();
+        pose = next;
+        if moved < rest {
+            return (pose, true);
+        }
+    }
+    (pose, false)
+}
+
 /// The rows of all accepted pairs at a pose.
 pub(crate) fn equations(
     source: &View,

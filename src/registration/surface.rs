@@ -7,15 +7,17 @@
 //!    to 15 %. Ranked by symmetric root mean square distance, within 8 degrees of a better one dropped, 8 kept.
 //! 3. Again with 500 points to 10 %, 4 kept.
 //! 4. The exact finish: nearest places on the surfaces themselves, untruncated, until the step vanishes. Untruncated, because two
-//!    persons' bones that differ in size fit best as wholes: a narrow tolerance locks on to one matching patch.
+//!    persons' bones that differ in size fit best as wholes: a narrow tolerance locks on to one matching patch. A few hundred
+//!    samples tell basins and handedness apart ([`survey`]); only the winner is worth the whole surface ([`finish`]).
 //! 5. When most of the surface agrees closely once the rest is down-weighted (the median distance falls to less than half), the
 //!    robust fit wins: a fragment, a tumour or a lesion must not drag the healthy surface along.
+//! 6. Raw clouds that differ by no more than their noise end with the narrow, symmetric point-to-plane fit of partial shapes.
 //!
 //! The symmetric distance decides. Papers: Besl and McKay 1992, Chen and Medioni 1992; Pottmann et al. 2006 for why the normal
 //! part of a distance is its Gauss-Newton model. Cost: some 0.2 s for bones of 20 000 points.
 
 use super::oriented::View;
-use super::refine::{Level, refine};
+use super::refine::{Level, refine, rest};
 use super::solve::{NormalEquations, cleaned};
 use crate::geometry::Rigid;
 use crate::matching::moments::from_moments;
@@ -23,8 +25,15 @@ use rayon::prelude::*;
 
 /// Poses nearer than this are one pose, degrees.
 pub(crate) const SAME_POSE_DEG: f64 = 8.0;
-/// Samples of each surface in the exact finish.
-const FINISH_SAMPLES: usize = 2500;
+/// Samples of each surface and most iterations by which surveyed poses are compared.
+const SURVEY_SAMPLES: usize = 300;
+const SURVEY_ITERATIONS: usize = 12;
+/// Samples of each surface on the way to the exact finish, and in it. With 2 500 of 4 000 points in it the median error of whole
+/// bones at 1 % noise is 0.44 degrees instead of 0.41.
+const NEAR_SAMPLES: usize = 600;
+const FINISH_SAMPLES: usize = 4000;
+/// A fit rests when its step is below this share of the spacing; `converged` asks for 0.001.
+const AT_REST: f64 = 3e-4;
 /// Most iterations of the exact finish.
 const FINISH_ITERATIONS: usize = 60;
 
@@ -85,8 +94,8 @@ impl Distances {
 }
 
 /// Finds the poses of two whole shapes, the best first; rivals are over [`SAME_POSE_DEG`] apart. `guesses` are extra first
-/// guesses in view coordinates.
-pub(crate) fn whole(
+/// guesses in view coordinates. The poses are good enough to tell basins and handedness apart; [`finish`] brings them to rest.
+pub(crate) fn survey(
     source: &View,
     target: &View,
     guesses: &[Rigid],
@@ -120,21 +129,52 @@ pub(crate) fn whole(
     };
     let poses = search(source, target, poses, fine, keep.max(2), scale);
     let mut fits: Vec<WholeFit> = poses
-        .into_iter()
-        .map(|pose| settle(source, target, pose, 500, 12, scale))
+        .into_par_iter()
+        .map(|pose| settle(source, target, pose, SURVEY_SAMPLES, SURVEY_ITERATIONS, scale))
         .collect();
     rank(&mut fits);
-    // Only the winner and its nearest rival are worth the whole surface.
-    for fit in fits.iter_mut().take(2) {
-        *fit = settle(source, target, fit.pose, FINISH_SAMPLES, FINISH_ITERATIONS, scale);
+    fits
+}
+
+/// Brings the surveyed winner to rest on the whole surface. Its nearest rival is measured there as well, and takes the lead if it
+/// is better after all; the others stay as they are.
+pub(crate) fn finish(source: &View, target: &View, fits: &mut Vec<WholeFit>, scale: bool) {
+    let near = |fit: &WholeFit| settle(source, target, fit.pose, NEAR_SAMPLES, FINISH_ITERATIONS, scale);
+    let finished = |fit: WholeFit| settle(source, target, fit.pose, FINISH_SAMPLES, FINISH_ITERATIONS, scale);
+    let Some(first) = fits.first_mut() else {
+        return;
+    };
+    *first = finished(near(first));
+    let best_rms = first.rms;
+    if let Some(rival) = fits.get_mut(1) {
+        *rival = near(rival);
+        rival.rms = Distances::new(source, target, &rival.pose, FINISH_SAMPLES).rms();
+        if rival.rms < best_rms {
+            *rival = finished(rival.clone());
+        }
     }
-    rank(&mut fits);
-    if let Some(best) = fits.first_mut()
-        && let Some(robust) = robust_finish(source, target, best.pose, scale)
-    {
+    rank(fits);
+    let Some(best) = fits.first_mut() else {
+        return;
+    };
+    if let Some(robust) = robust_finish(source, target, best.pose, scale) {
         *best = robust;
     }
-    fits
+    if let Some(close) = close_finish(source, target, best, scale) {
+        *best = close;
+    }
+}
+
+/// The fit of raw clouds that differ by no more than their noise: points in pairs, along the mean of both normals, within a narrow
+/// tolerance. De-noising rounds the two clouds' edges differently, and an untruncated fit follows that.
+fn close_finish(source: &View, target: &View, fit: &WholeFit, scale: bool) -> Option<WholeFit> {
+    let noise = source.noise.max(target.noise);
+    if noise <= 0.0 || fit.rms > noise.max(source.spacing) {
+        return None;
+    }
+    let (pose, converged) = rest(source, target, fit.pose, scale);
+    let rms = Distances::new(source, target, &pose, FINISH_SAMPLES).rms();
+    Some(WholeFit { pose, rms, converged })
 }
 
 /// A pose with the source brought to the target's size about its own centroid; whole shapes have comparable radii of gyration.
@@ -243,7 +283,7 @@ fn settle(
             break;
         }
         best.converged = step.size < 1e-3 * spacing;
-        if best.converged && rms > 0.02 * spacing && step.size < 1e-5 * spacing.max(rms) {
+        if rms > 0.02 * spacing && step.size < AT_REST * spacing {
             break;
         }
         pose = cleaned(step.motion.after(&pose), scale);
@@ -341,7 +381,8 @@ fn robust_finish(source: &View, target: &View, start: Rigid, scale: bool) -> Opt
         // Three medians are two standard deviations; never wider than before, so that the fit settles.
         width = width.min(3.0 * found.median).max(1e-6);
         converged = step.size < 1e-3 * source.spacing;
-        if step.size < 1e-10 {
+        let resting = median > 0.02 * source.spacing && step.size < AT_REST * source.spacing;
+        if resting || step.size < 1e-10 {
             break;
         }
     }

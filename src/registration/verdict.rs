@@ -1,23 +1,25 @@
 //! The front door: which pose is reported, and what is said of it.
 //!
-//! 1. Both surfaces become views in one unit; for `mirror auto` the source's mirror image too.
+//! 1. Both surfaces become views in one unit, raw clouds without their clutter; for `mirror auto` the source's mirror image too.
 //! 2. Whole search for every allowed handedness. It is believed at once when both surfaces agree nearly everywhere, or when both
 //!    are closed and differ by no more than two persons' bones do.
 //! 3. Otherwise the partial search runs too, and wins when free space says so.
 //! 4. A mirrored pose must be clearly better than an unmirrored one.
 
+use super::isolated::without_isolated;
 use super::oriented::{self, View};
 use super::partial::{self, RIVAL_DEG};
-use super::refine::{Level, equations};
+use super::refine::{Level, equations, rest};
 use super::result::{Conditioning, Hypothesis, Method, Registration};
 use super::score::{FINE, both_ways};
 use super::settings::{Extent, Mirror, RegistrationSettings};
-use super::shape::{RegistrationError, RegistrationShape};
+use super::shape::{RegistrationError, RegistrationShape, Surface};
 use super::significance::lead;
-use super::surface::{self, Distances};
+use super::surface::{self, Distances, WholeFit};
 use crate::geometry::Rigid;
 use crate::matching::{MatchingSettings, pose_hypotheses};
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 
 /// Free-space score over which whole shapes agree nearly everywhere (2 is everywhere).
 const SURELY_WHOLE: f64 = 1.4;
@@ -31,6 +33,8 @@ const MIRROR_SHARE: f64 = 0.97;
 const MIRROR_MARGIN: f64 = 0.05;
 /// Both handednesses fit about equally when their residuals are within this factor.
 const MIRROR_UNSURE: f64 = 1.05;
+/// A hand whose surveyed residual is this many times the other's has lost: what the finish still gains is within 15 %.
+const LOST_HAND: f64 = 1.3;
 /// Residuals below this say nothing about which pose is right: facets of a tessellation make as much, in units.
 const INDISTINCT: f64 = 2e-4;
 /// A partial pose replaces a whole one when its free-space score is this much higher.
@@ -85,6 +89,8 @@ pub fn register(
     settings.validate()?;
     target.validate("target")?;
     source.validate("source")?;
+    let (target_kept, source_kept) = rayon::join(|| uncluttered(target), || uncluttered(source));
+    let (target, source) = (&of_kept(target, &target_kept), &of_kept(source, &source_kept));
     let unit = oriented::diagonal(target.points()).max(oriented::diagonal(source.points()));
     let (target_view, source_view) = rayon::join(
         || View::new(target, unit, settings.samples, settings.seed),
@@ -99,7 +105,7 @@ pub fn register(
         }
     };
     let guesses: Vec<Vec<Rigid>> = sources
-        .iter()
+        .par_iter()
         .map(|view| scaffold_guesses(target, source, &target_view, view, unit, settings))
         .collect();
     let search = Search {
@@ -110,6 +116,26 @@ pub fn register(
     };
     let candidates = search.run();
     Ok(search.report(candidates, unit))
+}
+
+/// The points of a raw cloud that belong to a surface, when some do not.
+fn uncluttered(shape: &RegistrationShape) -> Option<Vec<DVec3>> {
+    match shape.surface {
+        Surface::Cloud {
+            points,
+            normals: None,
+        } => without_isolated(points),
+        _ => None,
+    }
+}
+
+/// The shape, of the kept points when some were dropped.
+fn of_kept<'a>(shape: &RegistrationShape<'a>, kept: &'a Option<Vec<DVec3>>) -> RegistrationShape<'a> {
+    let surface = kept.as_ref().map_or(shape.surface, |points| Surface::Cloud {
+        points,
+        normals: None,
+    });
+    RegistrationShape { surface, ..*shape }
 }
 
 /// Poses that the scaffolds allow, in view coordinates; none when a scaffold is missing.
@@ -190,10 +216,25 @@ impl Search<'_> {
     }
 
     fn whole(&self) -> Vec<Candidate> {
+        let scale = self.settings.scale;
+        let mut surveys: Vec<Vec<WholeFit>> = self
+            .sources
+            .iter()
+            .zip(self.guesses)
+            .map(|(source, guesses)| surface::survey(source, self.target, guesses, scale, 4))
+            .collect();
+        let least = |fits: &[WholeFit]| fits.first().map_or(f64::INFINITY, |f| f.rms);
+        let best = surveys
+            .iter()
+            .map(|fits| least(fits))
+            .fold(f64::INFINITY, f64::min);
         let mut out: Vec<Candidate> = Vec::new();
-        for (source, guesses) in self.sources.iter().zip(self.guesses) {
-            let fits = surface::whole(source, self.target, guesses, self.settings.scale, 4);
-            out.extend(fits.into_iter().map(|fit| Candidate {
+        for (source, fits) in self.sources.iter().zip(&mut surveys) {
+            // A hand that has lost clearly is reported as it was surveyed.
+            if least(fits) <= LOST_HAND * best.max(INDISTINCT) {
+                surface::finish(source, self.target, fits, scale);
+            }
+            out.extend(fits.iter().map(|fit| Candidate {
                 score: both_ways(source, self.target, &fit.pose, usize::MAX, FINE),
                 pose: fit.pose,
                 mirrored: source.mirrored,
@@ -242,7 +283,7 @@ impl Search<'_> {
         if let Some(best) = out.first_mut() {
             let source = self.sources.iter().find(|v| v.mirrored == best.mirrored);
             let source = source.expect("the candidate came from it");
-            (best.pose, best.converged) = partial::settle(source, self.target, best.pose);
+            (best.pose, best.converged) = rest(source, self.target, best.pose, false);
         }
         out
     }
@@ -402,10 +443,15 @@ impl Search<'_> {
         };
         let mut max = counted.quantile(1.0);
         if c.method == Method::Whole {
-            for &v in &source.vertices {
-                let q = c.pose.apply(v);
-                max = max.max(self.target.exact.touch(q).place.distance(q));
-            }
+            let at_vertices: Vec<f64> = source
+                .vertices
+                .par_iter()
+                .map(|&v| {
+                    let q = c.pose.apply(v);
+                    self.target.exact.touch(q).place.distance(q)
+                })
+                .collect();
+            max = at_vertices.into_iter().fold(max, f64::max);
         }
         Measured {
             rms: counted.rms(),
