@@ -3,7 +3,7 @@
 //! `cargo run --release --example registration_table -- [TRIALS] [CASE...]` with the bones of `../shared/data` (or of the folder
 //! in `MEDIAL_DATA`); cases: whole, crop50, crop50-low, crop50-high, overlap33, overlap20, one55, one35, one25, mesh, mirror.
 //! `... -- TRIALS dump FOLDER CASE...` writes the clouds of the trials, raw and de-noised, for `compare/registration.py`.
-//! `each` prints the error of every trial as well.
+//! `each` prints the error of every trial as well, with the standard error that was reported.
 //! Every trial takes one bone, samples it twice independently (4 000 points as target, 2 000 as source), cuts, adds noise in
 //! percent of the whole bone's diagonal, and turns the source by a uniform random rotation.
 
@@ -103,9 +103,9 @@ fn main() {
         bones.len()
     );
     println!(
-        "| case | noise % | success | median deg | wrong, flagged | right, flagged | median s | max s |"
+        "| case | noise % | success | median deg | wrong, flagged | right, flagged | rms of error / standard error | median s | max s |"
     );
-    println!("|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|");
     for case in &CASES {
         if chosen.is_empty() || chosen.iter().any(|c| *c == case.name) {
             run(case, &bones, trials);
@@ -171,6 +171,9 @@ fn dump(case: &Case, bones: &[Bone], trials: usize, folder: &Path) {
 
 fn run(case: &Case, bones: &[Bone], trials: usize) {
     let mut errors = Vec::new();
+    // Error over standard error, of the right ones.
+    let mut normed = Vec::new();
+    let mut each = String::new();
     let mut seconds = Vec::new();
     let (mut wrong_flagged, mut wrong, mut right_flagged) = (0, 0, 0);
     for trial in 0..trials {
@@ -190,6 +193,11 @@ fn run(case: &Case, bones: &[Bone], trials: usize) {
         seconds.push(clock.elapsed().as_secs_f64());
         let error = found.T_target_source.rotation_angle_deg(&motion.inverse());
         errors.push(error);
+        let standard = found.precision.map_or(f64::NAN, |p| p.rotation_deg);
+        each += &format!(" {error:.2}({standard:.2})");
+        if error < 5.0 {
+            normed.push(error / standard);
+        }
         if error >= 5.0 {
             wrong += 1;
             wrong_flagged += usize::from(found.ambiguous);
@@ -211,13 +219,13 @@ fn run(case: &Case, bones: &[Bone], trials: usize) {
         }
     }
     if std::env::args().any(|a| a == "each") {
-        let each: Vec<String> = errors.iter().map(|e| format!("{e:.2}")).collect();
-        println!("<!-- {}: {} -->", case.name, each.join(" "));
+        println!("<!-- {}, error (standard error):{each} -->", case.name);
     }
     errors.sort_by(f64::total_cmp);
     seconds.sort_by(f64::total_cmp);
+    let normed_rms = (normed.iter().map(|x: &f64| x * x).sum::<f64>() / normed.len().max(1) as f64).sqrt();
     println!(
-        "| {} | {} | {}/{trials} | {:.3} | {wrong_flagged}/{wrong} | {right_flagged}/{} | {:.2} | {:.2} |",
+        "| {} | {} | {}/{trials} | {:.3} | {wrong_flagged}/{wrong} | {right_flagged}/{} | {normed_rms:.2} | {:.2} | {:.2} |",
         case.name,
         case.noise,
         trials - wrong,

@@ -288,6 +288,36 @@ fn noisy_halves_that_share_a_half_are_joined() {
     }
 }
 
+/// The reported standard error is the size of the errors made: over 12 noisy pairs of clouds of one shape.
+#[test]
+fn errors_are_as_large_as_their_standard_errors() {
+    let target = lump(1.0);
+    let mut squares = 0.0;
+    for seed in 0..12 {
+        let motion = motion(seed);
+        let noise = 0.02 * target.diagonal_mm();
+        let (a, b) = (
+            cloud(&target, 3000, noise, 2 * seed),
+            cloud(&target, 1500, noise, 2 * seed + 1),
+        );
+        let b: Vec<DVec3> = b.iter().map(|&p| motion.apply(p)).collect();
+        let found = register(
+            &RegistrationShape::cloud(&a),
+            &RegistrationShape::cloud(&b),
+            &RegistrationSettings::default(),
+        )
+        .expect("sound clouds");
+        let precision = found.precision.expect("whole shapes share enough");
+        squares += (error_deg(&found, &motion) / precision.rotation_deg).powi(2);
+    }
+    let ratio = (squares / 12.0).sqrt();
+    assert!((0.5..1.6).contains(&ratio), "{ratio}");
+    // Nothing holds the turns of a ball.
+    let ball = star(|_| 10.0);
+    let found = fit(&ball, &moved(&ball, &motion(3)), &RegistrationSettings::default());
+    assert!(found.precision.is_none_or(|p| p.rotation_deg > 5.0) || found.ambiguous);
+}
+
 #[test]
 fn a_fragment_finds_its_place_on_the_whole() {
     let shape = lump(1.0);

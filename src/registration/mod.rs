@@ -7,7 +7,7 @@
 //!    and are de-noised.
 //! 2. Whole shapes: first guesses from moments and scaffolds, refined on the surfaces, symmetric distance decides.
 //! 3. Partial shapes, when the surfaces ask for it: poses from oriented point pairs, free space decides.
-//! 4. Ambiguity, conditioning and overlap of the chosen pose.
+//! 4. Ambiguity, conditioning, precision and overlap of the chosen pose.
 //!
 //! | file | idea |
 //! |---|---|
@@ -17,6 +17,7 @@
 //! | `partial`, `pairs` | partial shapes |
 //! | `score`, `refine`, `solve` | shared by both: free space, closest points, one linear step |
 //! | `significance` | whether one whole pose is better than another by more than the shapes differ |
+//! | `precision` | how precisely the pose is known |
 //! | `verdict` | which pose is reported and what is said of it |
 //! | [`difference`](mod@difference) | what is left between the shapes in that pose |
 //!
@@ -31,6 +32,7 @@ mod nearest_grid;
 mod oriented;
 mod pairs;
 mod partial;
+mod precision;
 mod refine;
 mod result;
 mod score;
@@ -43,7 +45,7 @@ mod verdict;
 
 pub use denoise::{CleanCloud, clean_cloud};
 pub use difference::{Difference, SheetContext, SheetDifference, difference};
-pub use result::{Conditioning, Hypothesis, Method, Registration, SlidingDirection};
+pub use result::{Conditioning, Hypothesis, Method, Precision, Registration, SlidingDirection};
 pub use settings::{Extent, Mirror, RegistrationSettings};
 pub use shape::{RegistrationError, RegistrationShape, Surface};
 pub use verdict::register;

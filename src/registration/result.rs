@@ -53,6 +53,16 @@ pub struct Conditioning {
     pub sliding: Vec<SlidingDirection>,
 }
 
+/// How far the pose would scatter if the same surfaces were scanned again: standard errors from the scatter of the residuals from
+/// one patch of the surface to the next. It says nothing of other basins; the runners-up do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Precision {
+    /// Standard error of the rotation, degrees: root of the summed variances about three axes.
+    pub rotation_deg: f64,
+    /// Standard error of the place of the middle of the shared surface, mm.
+    pub translation_mm: f64,
+}
+
 /// The pose of a source on a target.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[allow(
@@ -91,6 +101,8 @@ pub struct Registration {
     pub method: Method,
     /// How firmly the surfaces hold the pose.
     pub conditioning: Conditioning,
+    /// How precisely the pose is known; none where the surfaces share too little, or nothing holds one of the motions.
+    pub precision: Option<Precision>,
     /// Noise found in a raw source cloud (standard deviation, mm); 0 when it was a mesh or came with normals.
     pub noise_source: f64,
     /// The same for the target.

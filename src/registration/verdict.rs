@@ -9,8 +9,9 @@
 use super::isolated::without_isolated;
 use super::oriented::{self, View};
 use super::partial::{self, RIVAL_DEG};
-use super::refine::{Level, equations, rest};
-use super::result::{Conditioning, Hypothesis, Method, Registration};
+use super::precision::standard_errors;
+use super::refine::{Level, equations, rest, resting_level};
+use super::result::{Conditioning, Hypothesis, Method, Precision, Registration};
 use super::score::{FINE, both_ways};
 use super::settings::{Extent, Mirror, RegistrationSettings};
 use super::shape::{RegistrationError, RegistrationShape, Surface};
@@ -324,6 +325,7 @@ impl Search<'_> {
             score: best.score,
             method: best.method,
             conditioning: self.conditioning(&best),
+            precision: self.precision(&best, unit),
             noise_source: source.noise * unit,
             noise_target: self.target.noise * unit,
         }
@@ -426,6 +428,21 @@ impl Search<'_> {
         };
         let rows = equations(self.view(c.mirrored), self.target, &c.pose, level, level.from);
         rows.conditioning(self.target.gyration(), self.settings.sliding_share)
+    }
+
+    fn precision(&self, c: &Candidate, unit: f64) -> Option<Precision> {
+        let source = self.view(c.mirrored);
+        let level = resting_level(source, self.target);
+        // Two persons' bones differ by more than their noise: every pair within two of their distances counts.
+        let tolerance = match c.method {
+            Method::Whole => level.to.max(2.0 * c.rms),
+            Method::Partial => level.to,
+        };
+        let found = standard_errors(source, self.target, &c.pose, level, tolerance)?;
+        Some(Precision {
+            rotation_deg: found.rotation.to_degrees(),
+            translation_mm: found.translation * unit,
+        })
     }
 
     /// Distances and overlap of a pose.
