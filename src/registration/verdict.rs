@@ -2,7 +2,7 @@
 //!
 //! 1. Both surfaces become views in one unit, raw clouds without their clutter; for `mirror auto` the source's mirror image too.
 //! 2. Whole search for every allowed handedness. It is believed at once when both surfaces agree nearly everywhere, or when both
-//!    are closed and differ by no more than two persons' bones do.
+//!    are closed and differ by no more than two persons' bones do, or when neither has a part that the other lacks.
 //! 3. Otherwise the partial search runs too, and wins when free space says so.
 //! 4. A mirrored pose must be clearly better than an unmirrored one.
 
@@ -26,6 +26,8 @@ use rayon::prelude::*;
 const SURELY_WHOLE: f64 = 1.4;
 /// Largest symmetric distance of two closed shapes of one kind, in units; two persons' carpals reach 0.04.
 const ONE_KIND: f64 = 0.06;
+/// Share of samples at a border above which a shape may be cut: noise makes up to 0.06 of a whole one, a cut through the middle 0.12.
+const CUT_RIM: f64 = 0.08;
 /// Closer than this a sample lies on the other surface, in units.
 const ON_SURFACE: f64 = 0.03;
 /// A mirrored whole pose must have at most this share of the unmirrored residual.
@@ -213,7 +215,21 @@ impl Search<'_> {
     fn believed(&self, fit: &Candidate) -> bool {
         let source = self.view(fit.mirrored);
         let closed = source.closed && self.target.closed;
-        fit.score > SURELY_WHOLE || (closed && fit.rms < ONE_KIND)
+        fit.score > SURELY_WHOLE || (closed && fit.rms < ONE_KIND) || self.nothing_missing(fit)
+    }
+
+    /// Neither surface has a part that the other lacks: a cut leaves many points farther away than two bones of one kind differ.
+    fn nothing_missing(&self, fit: &Candidate) -> bool {
+        let source = self.view(fit.mirrored);
+        let rim = |v: &View| v.border.iter().filter(|b| **b).count() as f64 / v.border.len().max(1) as f64;
+        // Two halves of a ball fit each other without being wholes of anything; but each shows the rim of its cut.
+        if rim(source).max(rim(self.target)) > CUT_RIM {
+            return false;
+        }
+        let d = Distances::new(source, self.target, &fit.pose, 2000);
+        [&d.there, &d.back]
+            .iter()
+            .all(|d| d.iter().filter(|d| **d > ONE_KIND).count() <= d.len() / 100)
     }
 
     fn whole(&self) -> Vec<Candidate> {

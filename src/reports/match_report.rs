@@ -3,7 +3,7 @@
 //! In: `match.json`, `run.json` and a scene whose layers are named by the shapes `target` and `source` (source layers already
 //! moved). Out: a [`Report`].
 
-use super::facts::{Digits, at, cell, facts_table, items, number, run_section, shown, text};
+use super::facts::{at, cell, items, number, run_section, shown, text};
 use super::page::{Cell, KeyFigure, NoteLevel, Report, ReportError, Section, Table};
 use super::plot::{pretty, signed};
 use super::scene::Scene;
@@ -89,13 +89,16 @@ fn figures(report: &mut Report, r: &Value, motion: &Rigid) {
     } else {
         motion.rotation_angle_deg(&Rigid::IDENTITY)
     };
-    report.figures.push(
-        KeyFigure::new("Rotation", pretty(angle), "\u{b0}").note(if motion.is_mirrored() {
-            "after a point reflection"
-        } else {
-            ""
-        }),
-    );
+    let mut notes = Vec::new();
+    if motion.is_mirrored() {
+        notes.push("after a point reflection".to_owned());
+    }
+    if let Some(error) = number(r, "precision.rotation_deg") {
+        notes.push(format!("standard error {}\u{b0}", pretty(error)));
+    }
+    report
+        .figures
+        .push(KeyFigure::new("Rotation", pretty(angle), "\u{b0}").note(notes.join(", ")));
     if let Some(ok) = at(r, "converged").and_then(Value::as_bool) {
         let ambiguous = at(r, "ambiguous").and_then(Value::as_bool).unwrap_or(false);
         let (word, good) = match (ok, ambiguous) {
@@ -260,14 +263,17 @@ fn correspondences(r: &Value) -> Section {
 
 fn edit(r: &Value) -> Section {
     let mut section = Section::new("Edit distance");
-    let Some(Value::Object(map)) = at(r, "edit") else {
+    if at(r, "edit").is_none_or(Value::is_null) {
         return section;
-    };
-    let mut summary = map.clone();
-    summary.remove("operations");
-    section
-        .tables
-        .push(facts_table("", &Value::Object(summary), Digits::Few));
+    }
+    let mut bounds = Table::new("", &[":way from target to source", ":price [mm]"]);
+    if at(r, "edit.exact").and_then(Value::as_bool) == Some(true) {
+        bounds.row(["cheapest, proven".into(), cell(r, "edit.upper_bound")]);
+    } else {
+        bounds.row(["the way below".into(), cell(r, "edit.upper_bound")]);
+        bounds.row(["no way is cheaper than".into(), cell(r, "edit.lower_bound")]);
+    }
+    section.tables.push(bounds);
     let operations = items(r, "edit.operations");
     if !operations.is_empty() {
         let mut table = Table::new(

@@ -8,6 +8,7 @@
 use super::scene::{Layer, LayerKind, Scene};
 use glam::{DMat3, DVec3};
 use nalgebra::{Matrix3, SymmetricEigen};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::io::Write;
 
@@ -113,16 +114,35 @@ impl Image {
 }
 
 const SAMPLES: usize = 2;
+/// Rows of pixels drawn by themselves.
+const BAND: usize = 48;
 const BACKGROUND: [f32; 3] = [0.965, 0.972, 0.98];
 
 /// Depth and colour of what is opaque, and the sums of what is not, one entry a sample.
 struct Frame {
     width: usize,
+    /// First row of the band.
+    top: usize,
     height: usize,
     depth: Vec<f32>,
     colour: Vec<[f32; 3]>,
     veil: Vec<[f32; 4]>,
     transmitted: Vec<f32>,
+}
+
+impl Frame {
+    fn new(width: usize, top: usize, height: usize) -> Self {
+        let n = width * height;
+        Self {
+            width,
+            top,
+            height,
+            depth: vec![f32::NEG_INFINITY; n],
+            colour: vec![BACKGROUND; n],
+            veil: vec![[0.0; 4]; n],
+            transmitted: vec![1.0; n],
+        }
+    }
 }
 
 /// Vertices of a layer in the picture: x right and y down in samples, z toward the camera in mm.
@@ -180,14 +200,6 @@ impl Projection {
 pub fn render(scene: &Scene, view: &View, width: usize, height: usize) -> Image {
     let (w, h) = (SAMPLES * width, SAMPLES * height);
     let projection = Projection::fit(scene, view, w, h);
-    let mut frame = Frame {
-        width: w,
-        height: h,
-        depth: vec![f32::NEG_INFINITY; w * h],
-        colour: vec![BACKGROUND; w * h],
-        veil: vec![[0.0; 4]; w * h],
-        transmitted: vec![1.0; w * h],
-    };
     let visible = || {
         scene
             .layers
@@ -200,37 +212,83 @@ pub fn render(scene: &Scene, view: &View, width: usize, height: usize) -> Image 
     let is_glass = |l: &Layer| {
         l.kind == LayerKind::Surface && (hides_something || (surfaces > 1 && l.quantity.is_none()))
     };
-    for layer in visible().filter(|l| !is_glass(l)) {
-        draw(&mut frame, &projection, layer, false);
-    }
-    for layer in visible().filter(|l| is_glass(l)) {
-        draw(&mut frame, &projection, layer, true);
-    }
-    resolve(&frame, width, height)
-}
-
-fn draw(frame: &mut Frame, projection: &Projection, layer: &Layer, glass: bool) {
-    let corners: Vec<[f64; 3]> = layer.mesh.points.iter().map(|p| projection.apply(*p)).collect();
-    let normals = layer.mesh.vertex_normals();
-    let light = (projection.toward + 0.35 * projection.up - 0.25 * projection.right).normalize();
-    let base: Vec<[f32; 3]> = (0..corners.len())
-        .map(|i| match (&layer.quantity, layer.kind) {
-            (Some(q), LayerKind::Surface) if !glass => q.colour(i),
-            _ => [layer.colour[0], layer.colour[1], layer.colour[2]],
+    // What is solid hides what is behind it, so it is drawn first.
+    let solid = visible()
+        .filter(|l| !is_glass(l))
+        .map(|l| Projected::new(&projection, l, false));
+    let glass = visible()
+        .filter(|l| is_glass(l))
+        .map(|l| Projected::new(&projection, l, true));
+    let layers: Vec<Projected> = solid.chain(glass).collect();
+    // Bands of rows know nothing of each other.
+    let bands: Vec<Vec<u8>> = (0..height.div_ceil(BAND))
+        .into_par_iter()
+        .map(|band| {
+            let rows = band * BAND..height.min((band + 1) * BAND);
+            let mut frame = Frame::new(w, SAMPLES * rows.start, SAMPLES * rows.len());
+            for layer in &layers {
+                draw(&mut frame, &projection, layer);
+            }
+            resolve(&frame, width, rows.len())
         })
         .collect();
+    Image {
+        width,
+        height,
+        rgb: bands.concat(),
+    }
+}
+
+/// A layer as the camera sees it.
+struct Projected<'a> {
+    layer: &'a Layer,
+    glass: bool,
+    corners: Vec<[f64; 3]>,
+    normals: Vec<DVec3>,
+    base: Vec<[f32; 3]>,
+}
+
+impl<'a> Projected<'a> {
+    fn new(projection: &Projection, layer: &'a Layer, glass: bool) -> Self {
+        let corners: Vec<[f64; 3]> = layer.mesh.points.iter().map(|p| projection.apply(*p)).collect();
+        let base = (0..corners.len())
+            .map(|i| match (&layer.quantity, layer.kind) {
+                (Some(q), LayerKind::Surface) if !glass => q.colour(i),
+                _ => [layer.colour[0], layer.colour[1], layer.colour[2]],
+            })
+            .collect();
+        Self {
+            layer,
+            glass,
+            normals: layer.mesh.vertex_normals(),
+            corners,
+            base,
+        }
+    }
+}
+
+fn draw(frame: &mut Frame, projection: &Projection, projected: &Projected) {
+    let Projected {
+        layer,
+        glass,
+        corners,
+        normals,
+        base,
+    } = projected;
+    let light = (projection.toward + 0.35 * projection.up - 0.25 * projection.right).normalize();
     for t in &layer.mesh.triangles {
         let [a, b, c] = t.map(|i| corners[i as usize]);
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
         if area.abs() < 1e-12 {
             continue;
         }
-        let range = |k: usize, limit: usize| {
-            let lo = a[k].min(b[k]).min(c[k]).ceil().max(0.0) as usize;
-            let hi = a[k].max(b[k]).max(c[k]).floor().min(limit as f64 - 1.0);
-            (lo, if hi < 0.0 { None } else { Some(hi as usize) })
+        let range = |k: usize, from: usize, limit: usize| {
+            let lo = a[k].min(b[k]).min(c[k]).ceil().max(from as f64) as usize;
+            let hi = a[k].max(b[k]).max(c[k]).floor().min((from + limit) as f64 - 1.0);
+            (lo, if hi < from as f64 { None } else { Some(hi as usize) })
         };
-        let ((x0, Some(x1)), (y0, Some(y1))) = (range(0, frame.width), range(1, frame.height)) else {
+        let (x, y) = (range(0, 0, frame.width), range(1, frame.top, frame.height));
+        let ((x0, Some(x1)), (y0, Some(y1))) = (x, y) else {
             continue;
         };
         for y in y0..=y1 {
@@ -243,7 +301,7 @@ fn draw(frame: &mut Frame, projection: &Projection, layer: &Layer, glass: bool) 
                 }
                 let mix = |f: &dyn Fn(u32) -> DVec3| (1.0 - u - v) * f(t[0]) + u * f(t[1]) + v * f(t[2]);
                 let z = ((1.0 - u - v) * a[2] + u * b[2] + v * c[2]) as f32;
-                let i = y * frame.width + x;
+                let i = (y - frame.top) * frame.width + x;
                 if z <= frame.depth[i] {
                     continue;
                 }
@@ -251,7 +309,7 @@ fn draw(frame: &mut Frame, projection: &Projection, layer: &Layer, glass: bool) 
                 let tint = mix(&|k| DVec3::from_array(base[k as usize].map(f64::from)));
                 let facing = normal.dot(projection.toward).abs();
                 let lit = 0.38 + 0.62 * normal.dot(light).abs();
-                if glass {
+                if *glass {
                     let alpha = 0.10 + 0.62 * (1.0 - facing).powi(3);
                     let shade = (lit * (1.0 - 0.45 * (1.0 - facing).powi(2))) * tint;
                     let veil = &mut frame.veil[i];
@@ -269,7 +327,8 @@ fn draw(frame: &mut Frame, projection: &Projection, layer: &Layer, glass: bool) 
     }
 }
 
-fn resolve(frame: &Frame, width: usize, height: usize) -> Image {
+/// The pixels of a band, as many rows as asked.
+fn resolve(frame: &Frame, width: usize, height: usize) -> Vec<u8> {
     let mut rgb = Vec::with_capacity(3 * width * height);
     for y in 0..height {
         for x in 0..width {
@@ -286,7 +345,7 @@ fn resolve(frame: &Frame, width: usize, height: usize) -> Image {
             rgb.extend(sum.map(|s| (s / n * 255.0).round().clamp(0.0, 255.0) as u8));
         }
     }
-    Image { width, height, rgb }
+    rgb
 }
 
 #[cfg(test)]
