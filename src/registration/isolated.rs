@@ -2,10 +2,11 @@
 //!
 //! In: a raw cloud. Out: the cloud without the points that lie alone or in small groups.
 //!
-//! 1. The reach of a point is the distance of its sixth neighbour.
-//! 2. Two neighbours are joined when they are not farther apart than 2.5 times the smaller of their reaches: along a surface, however
-//!    its density changes, all are; a stray point is far from the surface by the surface's measure, and stray points among
-//!    themselves make small groups.
+//! 1. The reach of a point is the distance of its eighth neighbour.
+//! 2. Two neighbours are joined when they are not farther apart than 1.25 times the smaller of their reaches: along a surface, however
+//!    its density changes, all are (2 000 of 2 000 random points on ellipsoids, also where the density falls to a twentieth); a
+//!    stray point is far from the surface by the surface's measure, and stray points among themselves make small groups
+//!    (85 to 91 of 100 are told). With 2.5 times, chains of stray points hang on to the surface and nearly all stay.
 //! 3. Groups of less than 5 % of the points go.
 //!
 //! Why at all: lengths of the search are shares of the diagonal, which clutter lengthens, and an untruncated distance feels it.
@@ -19,10 +20,9 @@ use petgraph::unionfind::UnionFind;
 use rayon::prelude::*;
 
 /// The neighbour whose distance is a point's reach, and how many are joined.
-const NEIGHBOUR: usize = 6;
-/// Neighbours farther apart than this many of the smaller reach are not joined. Between random points on a surface the ratio stays
-/// below 2.
-const APART: f64 = 2.5;
+const NEIGHBOUR: usize = 8;
+/// Neighbours farther apart than this many of the smaller reach are not joined.
+const APART: f64 = 1.25;
 /// Share of the points a group must have to be a surface.
 const LEAST_SHARE: f64 = 0.05;
 /// Fewer points are all kept.
@@ -85,7 +85,7 @@ mod tests {
         let surface = kept.len() - clutter;
         assert!(surface >= 1990, "{surface} of 2000 surface points kept");
         assert!(
-            2 * clutter <= mixed.len() - 2000,
+            4 * clutter <= mixed.len() - 2000,
             "{clutter} of {} left",
             mixed.len() - 2000
         );

@@ -165,11 +165,16 @@ pub(crate) fn finish(source: &View, target: &View, fits: &mut Vec<WholeFit>, sca
     }
 }
 
+/// Whether whole shapes of this residual end with the narrow fit.
+pub(crate) fn ends_close(source: &View, target: &View, rms: f64) -> bool {
+    let noise = source.noise.max(target.noise);
+    noise > 0.0 && rms <= noise.max(source.spacing)
+}
+
 /// The fit of raw clouds that differ by no more than their noise: points in pairs, along the mean of both normals, within a narrow
 /// tolerance. De-noising rounds the two clouds' edges differently, and an untruncated fit follows that.
 fn close_finish(source: &View, target: &View, fit: &WholeFit, scale: bool) -> Option<WholeFit> {
-    let noise = source.noise.max(target.noise);
-    if noise <= 0.0 || fit.rms > noise.max(source.spacing) {
+    if !ends_close(source, target, fit.rms) {
         return None;
     }
     let (pose, converged) = rest(source, target, fit.pose, scale);

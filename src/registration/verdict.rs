@@ -2,8 +2,9 @@
 //!
 //! 1. Both surfaces become views in one unit, raw clouds without their clutter; for `mirror auto` the source's mirror image too.
 //! 2. Whole search for every allowed handedness. It is believed at once when both surfaces agree nearly everywhere, or when both
-//!    are closed and differ by no more than two persons' bones do, or when neither has a part that the other lacks.
-//! 3. Otherwise the partial search runs too, and wins when free space says so.
+//!    are closed and differ by no more than two persons' bones do.
+//! 3. Otherwise the partial search runs too, and wins when free space says so; a doubt is raised when the whole pose is another one
+//!    and neither shape has a part that the other lacks.
 //! 4. A mirrored pose must be clearly better than an unmirrored one.
 
 use super::isolated::without_isolated;
@@ -28,6 +29,8 @@ const SURELY_WHOLE: f64 = 1.4;
 const ONE_KIND: f64 = 0.06;
 /// Share of samples at a border above which a shape may be cut: noise makes up to 0.06 of a whole one, a cut through the middle 0.12.
 const CUT_RIM: f64 = 0.08;
+/// A whole pose farther than this from the chosen partial one, degrees, is another answer.
+const WHOLE_TOO_DEG: f64 = 5.0;
 /// Closer than this a sample lies on the other surface, in units.
 const ON_SURFACE: f64 = 0.03;
 /// A mirrored whole pose must have at most this share of the unmirrored residual.
@@ -117,8 +120,11 @@ pub fn register(
         guesses: &guesses,
         settings,
     };
-    let candidates = search.run();
-    Ok(search.report(candidates, unit))
+    let (candidates, doubt) = search.run();
+    let mut found = search.report(candidates, unit);
+    found.ambiguous |= doubt.is_some();
+    found.ambiguity.extend(doubt);
+    Ok(found)
 }
 
 /// The points of a raw cloud that belong to a surface, when some do not.
@@ -195,34 +201,41 @@ impl Search<'_> {
         matching.expect("candidates come from these views")
     }
 
-    /// All verified poses, the chosen one first.
-    fn run(&self) -> Vec<Candidate> {
+    /// All verified poses, the chosen one first, and a doubt that only the other search can raise.
+    fn run(&self) -> (Vec<Candidate>, Option<String>) {
         let whole = match self.settings.extent {
             Extent::Partial => Vec::new(),
             _ => self.whole(),
         };
         if self.settings.extent == Extent::Whole || whole.first().is_some_and(|w| self.believed(w)) {
-            return whole;
+            return (whole, None);
         }
         let partial = self.partial();
         match (whole.first(), partial.first()) {
-            (Some(w), Some(p)) if p.score > w.score + PARTIAL_MARGIN => partial,
-            (None, _) => partial,
-            _ => whole,
+            (Some(w), Some(p)) if p.score > w.score + PARTIAL_MARGIN => {
+                let angle = w.pose.rotation_angle_deg(&p.pose);
+                let doubt = (angle > WHOLE_TOO_DEG && self.nothing_missing(w)).then(|| {
+                    format!("neither shape lacks a part, and as wholes they fit {angle:.0} degrees away")
+                });
+                (partial, doubt)
+            }
+            (None, _) => (partial, None),
+            _ => (whole, None),
         }
     }
 
     fn believed(&self, fit: &Candidate) -> bool {
         let source = self.view(fit.mirrored);
         let closed = source.closed && self.target.closed;
-        fit.score > SURELY_WHOLE || (closed && fit.rms < ONE_KIND) || self.nothing_missing(fit)
+        fit.score > SURELY_WHOLE || (closed && fit.rms < ONE_KIND)
     }
 
     /// Neither surface has a part that the other lacks: a cut leaves many points farther away than two bones of one kind differ.
     fn nothing_missing(&self, fit: &Candidate) -> bool {
         let source = self.view(fit.mirrored);
         let rim = |v: &View| v.border.iter().filter(|b| **b).count() as f64 / v.border.len().max(1) as f64;
-        // Two halves of a ball fit each other without being wholes of anything; but each shows the rim of its cut.
+        // Two halves of a ball fit each other without being wholes of anything; but each shows the rim of its cut, unless noise
+        // hides it. So this raises a doubt and does not decide: a half of a triquetrum at 2 % noise fits the other upside down.
         if rim(source).max(rim(self.target)) > CUT_RIM {
             return false;
         }
@@ -449,12 +462,14 @@ impl Search<'_> {
     fn precision(&self, c: &Candidate, unit: f64) -> Option<Precision> {
         let source = self.view(c.mirrored);
         let level = resting_level(source, self.target);
-        // Two persons' bones differ by more than their noise: every pair within two of their distances counts.
-        let tolerance = match c.method {
-            Method::Whole => level.to.max(2.0 * c.rms),
-            Method::Partial => level.to,
+        let robust = c.method == Method::Partial || surface::ends_close(source, self.target, c.rms);
+        // An untruncated fit used every pair; beyond four of its distances hardly any is left.
+        let tolerance = if robust {
+            level.to
+        } else {
+            level.to.max(4.0 * c.rms)
         };
-        let found = standard_errors(source, self.target, &c.pose, level, tolerance)?;
+        let found = standard_errors(source, self.target, &c.pose, level, tolerance, robust)?;
         Some(Precision {
             rotation_deg: found.rotation.to_degrees(),
             translation_mm: found.translation * unit,
