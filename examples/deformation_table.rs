@@ -180,7 +180,11 @@ fn changed(change: Change, shape: &Shape, warp: &Warp, seed: u64) -> Vec<DVec3> 
     let left: Cloud = match change {
         Change::Missing(share) => remove_ball(&cloud, cloud.points[0], share * diagonal).cloud,
         Change::Cuts(share) => crop_half_spaces(&denser(share), 3, share, other).cloud,
-        Change::OneSided => visible_from(&denser(0.5), &mesh, random_direction(other), 80.0).cloud,
+        // A thin plate seen edge-on shows next to nothing: another direction is taken.
+        Change::OneSided => (0..20)
+            .map(|k| visible_from(&denser(0.5), &mesh, random_direction(other + 100 * k), 80.0).cloud)
+            .find(|seen| seen.points.len() >= 1000)
+            .expect("one of 20 directions sees the shape"),
         Change::Density(ratio) => sample_density_gradient(&mesh, 2000, ratio, other),
         _ => cloud,
     };
