@@ -215,10 +215,10 @@ pub fn render(scene: &Scene, view: &View, width: usize, height: usize) -> Image 
     // What is solid hides what is behind it, so it is drawn first.
     let solid = visible()
         .filter(|l| !is_glass(l))
-        .map(|l| Projected::new(&projection, l, false));
+        .map(|l| Projected::new(&projection, l, false, height));
     let glass = visible()
         .filter(|l| is_glass(l))
-        .map(|l| Projected::new(&projection, l, true));
+        .map(|l| Projected::new(&projection, l, true, height));
     let layers: Vec<Projected> = solid.chain(glass).collect();
     // Bands of rows know nothing of each other.
     let bands: Vec<Vec<u8>> = (0..height.div_ceil(BAND))
@@ -227,7 +227,7 @@ pub fn render(scene: &Scene, view: &View, width: usize, height: usize) -> Image 
             let rows = band * BAND..height.min((band + 1) * BAND);
             let mut frame = Frame::new(w, SAMPLES * rows.start, SAMPLES * rows.len());
             for layer in &layers {
-                draw(&mut frame, &projection, layer);
+                draw(&mut frame, &projection, layer, &layer.of_band[band]);
             }
             resolve(&frame, width, rows.len())
         })
@@ -246,10 +246,12 @@ struct Projected<'a> {
     corners: Vec<[f64; 3]>,
     normals: Vec<DVec3>,
     base: Vec<[f32; 3]>,
+    /// The triangles that each band of rows may show, ascending.
+    of_band: Vec<Vec<u32>>,
 }
 
 impl<'a> Projected<'a> {
-    fn new(projection: &Projection, layer: &'a Layer, glass: bool) -> Self {
+    fn new(projection: &Projection, layer: &'a Layer, glass: bool, height: usize) -> Self {
         let corners: Vec<[f64; 3]> = layer.mesh.points.iter().map(|p| projection.apply(*p)).collect();
         let base = (0..corners.len())
             .map(|i| match (&layer.quantity, layer.kind) {
@@ -261,22 +263,43 @@ impl<'a> Projected<'a> {
             layer,
             glass,
             normals: layer.mesh.vertex_normals(),
+            of_band: triangles_of_bands(&layer.mesh.triangles, &corners, height),
             corners,
             base,
         }
     }
 }
 
-fn draw(frame: &mut Frame, projection: &Projection, projected: &Projected) {
+fn triangles_of_bands(triangles: &[[u32; 3]], corners: &[[f64; 3]], height: usize) -> Vec<Vec<u32>> {
+    let mut of_band = vec![Vec::new(); height.div_ceil(BAND)];
+    let band_of = |y: f64| (y / (SAMPLES * BAND) as f64).floor();
+    for (i, t) in triangles.iter().enumerate() {
+        let [a, b, c] = t.map(|v| corners[v as usize][1]);
+        // Negative numbers become 0 and too large ones are cut off below.
+        let first = band_of(a.min(b).min(c)).max(0.0) as usize;
+        let last = band_of(a.max(b).max(c));
+        if last < 0.0 {
+            continue;
+        }
+        for band in of_band.iter_mut().take(last as usize + 1).skip(first) {
+            band.push(i as u32);
+        }
+    }
+    of_band
+}
+
+fn draw(frame: &mut Frame, projection: &Projection, projected: &Projected, triangles: &[u32]) {
     let Projected {
         layer,
         glass,
         corners,
         normals,
         base,
+        ..
     } = projected;
     let light = (projection.toward + 0.35 * projection.up - 0.25 * projection.right).normalize();
-    for t in &layer.mesh.triangles {
+    for &triangle in triangles {
+        let t = &layer.mesh.triangles[triangle as usize];
         let [a, b, c] = t.map(|i| corners[i as usize]);
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
         if area.abs() < 1e-12 {

@@ -69,7 +69,7 @@ pub fn samples(mesh: &TriangleMesh, taken: &[DVec3], count: usize, spacing_mm: f
                 return false;
             }
             let mut nearest2 = f64::INFINITY;
-            for i in grid.near(c.point) {
+            for i in grid.near_within(c.point, radius) {
                 let k = &kept[i as usize];
                 if k.normal.dot(c.normal) >= 0.0 {
                     nearest2 = nearest2.min((k.point - c.point).length_squared());
@@ -162,10 +162,27 @@ impl Grid {
 
     /// The points of the 27 cells about `p`.
     pub(super) fn near(&self, p: DVec3) -> impl Iterator<Item = u32> + '_ {
+        self.near_within(p, f64::INFINITY)
+    }
+
+    /// The points of those of the 27 cells about `p` that come within `reach` of it: about half of them for a reach of one cell.
+    fn near_within(&self, p: DVec3, reach: f64) -> impl Iterator<Item = u32> + '_ {
         let [x, y, z] = self.key(p);
+        let from_low = p - DVec3::new(x as f64, y as f64, z as f64) * self.cell;
+        // Squared distance to the slab of the cells below, the same and above, on each axis.
+        let slab2 = from_low.to_array().map(|d| {
+            let (below, above) = (d.max(0.0), (self.cell - d).max(0.0));
+            [below * below, 0.0, above * above]
+        });
+        let reach2 = reach * reach * (1.0 + 1e-9);
         NEAREST_FIRST.iter().flat_map(move |[i, j, k]| {
             let key = [x + i, y + j, z + k];
-            let mut at = self.heads.get(&key).copied().unwrap_or(NONE);
+            let away2 = slab2[0][(i + 1) as usize] + slab2[1][(j + 1) as usize] + slab2[2][(k + 1) as usize];
+            let mut at = if away2 > reach2 {
+                NONE
+            } else {
+                self.heads.get(&key).copied().unwrap_or(NONE)
+            };
             std::iter::from_fn(move || {
                 let here = at;
                 if here == NONE {
