@@ -11,6 +11,7 @@ use medial_scaffold::fine_scaffold::Side;
 use medial_scaffold::geometry::{Rigid, TriangleMesh};
 use medial_scaffold::pipeline::{MatchRun, MatchSettings, match_shapes};
 use medial_scaffold::registration::{Extent, Mirror};
+use medial_scaffold::reports::plot::pretty;
 use medial_scaffold::reports::{
     CorrespondenceLine, PlyEncoding, Quantity, Report, Scene, VertexField, colour, glb_bytes, match_report,
     write_bytes, write_json, write_ply, write_tables, write_tfm,
@@ -160,7 +161,11 @@ pub fn summary(done: &MatchRun) -> String {
     if let Some(d) = &done.difference
         && let (Some(target), Some(source)) = (d.volume_target, d.volume_source)
     {
-        text += &format!("volume: target {target:.2} mm^3, source {source:.2} mm^3\n");
+        text += &format!(
+            "volume: target {} mm^3, source {} mm^3\n",
+            pretty(target),
+            pretty(source)
+        );
     }
     text
 }

@@ -11,6 +11,7 @@ use medial_scaffold::geometry::Rigid;
 use medial_scaffold::measures::thickness;
 use medial_scaffold::pipeline::{ScaffoldRun, scaffold};
 use medial_scaffold::regularise::Cost;
+use medial_scaffold::reports::plot::pretty;
 use medial_scaffold::reports::{
     MedialMesh, PlyEncoding, Quantity, Scene, VertexField, colour, curves_polydata, glb_bytes,
     scaffold_report, sheets_polydata, write_bytes, write_json, write_ma, write_ply, write_tables, write_vtp,
@@ -107,30 +108,31 @@ fn summary(done: &ScaffoldRun) -> String {
     let document = done.document();
     let (c, s, t) = (document.counts, document.surface, document.topology);
     format!(
-        "{}: {} sheets, {} axial curves, {} ribs, {} wires, {} nodes at tolerance {:.4} mm\n\
-         surface: {} vertices, {} triangles, Euler number {}, {}{:.2} mm^2\n\
+        "{}: {} sheets, {} axial curves, {} ribs, {} wires, {} nodes at tolerance {} mm\n\
+         surface: {} vertices, {} triangles, Euler number {}, {}{} mm^2\n\
          Betti numbers: solid {:?}, scaffold {:?} ({}); Morse number {}\n\
-         fidelity: at most {:.4} mm ({:.2} % of the diagonal)\n",
+         fidelity: at most {} mm ({:.2} % of the diagonal)\n",
         document.name,
         c.sheets,
         c.axial_curves,
         c.rib_curves,
         c.wires,
         c.nodes,
-        document.tolerance_mm,
+        pretty(document.tolerance_mm),
         s.vertices,
         s.triangles,
         s.euler,
         s.volume
             .map_or(String::from("no volume (open or not manifold), "), |v| format!(
-                "closed, {v:.2} mm^3, "
+                "closed, {} mm^3, ",
+                pretty(v)
             )),
-        s.area,
+        pretty(s.area),
         <[i64; 3]>::from(t.solid_betti),
         <[i64; 3]>::from(t.scaffold_betti),
         if t.agree { "agree" } else { "DISAGREE" },
         document.full.morse,
-        document.fidelity.hausdorff,
+        pretty(document.fidelity.hausdorff),
         document.fidelity.hausdorff_percent_diag,
     )
 }
