@@ -5,7 +5,7 @@
 //!
 //! 1. Prepare: outliers, noise, thinning ([`super::prepare`]).
 //! 2. Close ([`super::closure`]), whatever the cloud is: a closed surface shows by its unsupported area how open it is.
-//! 3. Decide: open when 3 % or more of the area has no points to support it ([`super::openness`]). An open surface is the
+//! 3. Decide: open when 1.5 % or more of the area has no points to support it, 3 % with strong noise (`judge`). An open surface is the
 //!    greedy one, oriented where that can be done ([`super::orient`]).
 //! 4. Second opinions: for strong noise a second and third thinning seed; the majority is returned.
 //! 5. Doubt ([`super::self_check`]): the result looks for its own faults.
@@ -19,99 +19,18 @@ use super::closure::{Closure, ClosureSettings, close, close_without_off, preset_
 use super::error::SegregationError;
 use super::gap_cost::CostRule;
 use super::gap_transforms::gap_transforms;
+use super::judge::{Judged, sorted};
 use super::labels::{Segregation, boundary_triangles};
-use super::openness::{area_share, patches, rims, unsupported};
+use super::openness::{patches, rims};
 use super::orient::orient;
-use super::prepare::{Cleaned, PrepareReport, Prepared, Strength, clean, thin_out};
-use super::report::{ClosingReport, CloudReport, ComponentReport, Decision, SecondOpinion, Variation};
+use super::prepare::{Cleaned, Prepared, Strength, clean, thin_out};
+use super::report::{ClosingReport, CloudReport, ComponentReport, SecondOpinion, Variation};
 use super::self_check::{doubts, pull_opinions, self_check};
+use super::settings::{ClosedOrOpen, Denoise, SegregationSettings};
 use crate::delaunay::{Facet, Triangulation};
 use crate::geometry::{Neighbours, TriangleMesh, VertexId};
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-
-/// Whether noise may be removed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Denoise {
-    /// As far as the measured noise demands.
-    #[default]
-    Auto,
-    /// Never: every distinct point is used as given.
-    Off,
-    /// At least one pass.
-    Always,
-}
-
-/// Whether the surface is to be closed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ClosedOrOpen {
-    /// By the unsupported area.
-    #[default]
-    Auto,
-    /// Closed, holes filled.
-    Closed,
-    /// Open, holes left.
-    Open,
-}
-
-/// Settings of [`segregate_cloud`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SegregationSettings {
-    /// Whether noise may be removed.
-    pub denoise: Denoise,
-    /// Whether the surface is to be closed.
-    pub closed: ClosedOrOpen,
-    /// Lengths the gap-transform cost is measured against.
-    pub cost: CostRule,
-    /// Return only the component of this rank (0: most points); `None` returns all.
-    pub component: Option<usize>,
-    /// Seed of the thinning, the one random choice.
-    pub seed: u64,
-    /// Share of unsupported area from which a cloud is open. Measured: closing a hole of 4 % of the area takes at least
-    /// 1.3 % (median 3.6 %, less than 4 because a patch is flat); right closed surfaces have at most 0.8 % with noise up to a
-    /// quarter of the spacing.
-    pub open_area_share: f64,
-    /// The same for clouds whose noise reaches [`Self::second_opinion_noise`], of which right closed surfaces have up to
-    /// 1.9 %, and for those that lost more than 1 % of their points as outliers (up to 2.2 %: with outliers go points of
-    /// thin parts).
-    pub noisy_open_area_share: f64,
-    /// Least share of the points a component must touch; smaller ones are islands.
-    pub least_component_share: f64,
-    /// Noise over spacing from which a second seed is tried. Measured: below it no run of 108 was wrong.
-    pub second_opinion_noise: f64,
-}
-
-impl Default for SegregationSettings {
-    fn default() -> Self {
-        Self {
-            denoise: Denoise::Auto,
-            closed: ClosedOrOpen::Auto,
-            cost: CostRule::Local,
-            component: None,
-            seed: 0,
-            open_area_share: 0.015,
-            noisy_open_area_share: 0.03,
-            least_component_share: 0.01,
-            second_opinion_noise: 0.35,
-        }
-    }
-}
-
-impl SegregationSettings {
-    /// The share from which a cloud prepared like this is open.
-    fn threshold(&self, prepared: &PrepareReport) -> f64 {
-        let few_outliers = prepared.outliers as f64 <= MANY_OUTLIERS * prepared.points as f64;
-        if few_outliers && prepared.noise_over_spacing < self.second_opinion_noise {
-            self.open_area_share
-        } else {
-            self.noisy_open_area_share
-        }
-    }
-}
 
 /// A segregated cloud.
 #[derive(Clone, Debug, Default)]
@@ -256,12 +175,6 @@ pub(super) fn segregate_with_preset(
     })
 }
 
-fn sorted(t: [VertexId; 3]) -> [u32; 3] {
-    let mut t = t.map(|v| v.0);
-    t.sort_unstable();
-    t
-}
-
 pub(super) fn check(points: &[DVec3]) -> Result<(), SegregationError> {
     match points.iter().position(|p| !p.is_finite()) {
         Some(index) => {
@@ -334,42 +247,8 @@ fn prefer_supported(closure: &mut Closure, threshold: f64, settings: &Segregatio
     }
 }
 
-/// Share of the points beyond which outliers were no exception.
-const MANY_OUTLIERS: f64 = 0.01;
 /// Share of the threshold from which unsupported area is looked into.
 const SUSPICIOUS: f64 = 0.5;
-
-/// A closed surface and which of its triangles points support.
-struct Judged {
-    triangles: Vec<[VertexId; 3]>,
-    raw: Vec<[u32; 3]>,
-    bare: Vec<bool>,
-    share: f64,
-}
-
-impl Judged {
-    /// Triangles in `known` (sorted corners) count as supported.
-    fn new(closure: &Closure, known: &BTreeSet<[u32; 3]>) -> Self {
-        let triangles = boundary_triangles(&closure.triangulation, &closure.inside);
-        let raw: Vec<[u32; 3]> = triangles.iter().map(|t| t.map(|v| v.0)).collect();
-        let points = &closure.triangulation.points;
-        let mut bare = unsupported(points, &raw, &closure.spacing_mm);
-        for (mark, t) in bare.iter_mut().zip(&triangles) {
-            *mark &= known.is_empty() || !known.contains(&sorted(*t));
-        }
-        let share = area_share(points, &raw, &bare);
-        Self {
-            triangles,
-            raw,
-            bare,
-            share,
-        }
-    }
-
-    fn decide(&self, threshold: f64, settings: &SegregationSettings) -> Decision {
-        decide(self.share, self.raw.is_empty(), threshold, settings)
-    }
-}
 
 fn opinion(run: &Run) -> SecondOpinion {
     opinion_of(&closed_mesh(&run.closure), Variation::Thinning { seed: run.seed })
@@ -543,41 +422,6 @@ fn nearest_generators(points: &[DVec3], generators: &[DVec3], source: &[u32]) ->
         nearest[i as usize] = VertexId(n.index);
     }
     nearest
-}
-
-fn decide(share: f64, nothing_inside: bool, threshold: f64, settings: &SegregationSettings) -> Decision {
-    let percent = 100.0 * share;
-    let limit = 100.0 * threshold;
-    let (closed, by_user, reason) = match settings.closed {
-        ClosedOrOpen::Closed => (
-            true,
-            true,
-            format!("closed as asked; {percent:.2} % of the area has no points to support it"),
-        ),
-        ClosedOrOpen::Open => (false, true, "left open as asked".to_owned()),
-        ClosedOrOpen::Auto if nothing_inside => (false, false, "open: the points enclose nothing".to_owned()),
-        ClosedOrOpen::Auto if share >= threshold => (
-            false,
-            false,
-            format!(
-                "open: closing it would take {percent:.2} % of the area where there are no points (limit {limit:.2} %)"
-            ),
-        ),
-        ClosedOrOpen::Auto => (
-            true,
-            false,
-            format!(
-                "closed: only {percent:.2} % of the area has no points to support it (limit {limit:.2} %)"
-            ),
-        ),
-    };
-    Decision {
-        closed,
-        by_user,
-        unsupported_area_share: share,
-        threshold,
-        reason,
-    }
 }
 
 /// How much larger than the least of its neighbours a spacing may be by chance.

@@ -14,11 +14,11 @@
 //!
 //! Cost: as for a cloud of its points.
 
-use super::cloud::SegregationSettings;
 use super::error::SegregationError;
 use super::mesh_repair::{ChangeKind, MeshRepairReport, segregate_mesh};
 use super::openness::{area, open_edges};
 use super::report::CloudReport;
+use super::settings::SegregationSettings;
 use crate::geometry::TriangleMesh;
 use crate::geometry::mesh::DisjointSets;
 use glam::DVec3;

@@ -12,9 +12,10 @@
 //!
 //! Cost: as for a cloud.
 
-use super::cloud::{CloudSegregation, Denoise, SegregationSettings, check, segregate_with_preset};
+use super::cloud::{CloudSegregation, check, segregate_with_preset};
 use super::error::SegregationError;
 use super::prepare::compare;
+use super::settings::{Denoise, SegregationSettings};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -7,7 +7,7 @@
 //!   generators where that does not give the surface's topology.
 //! * [`cloud`]: a raw cloud is prepared ([`prepare`]: outliers, noise), shows its surface by greedy gap transforms
 //!   ([`gap_transforms`] at the price of [`gap_cost`]), is closed ([`closure`]: [`diffusion`], [`labelling`] with [`min_cut`], [`islands`],
-//!   [`star_repair`], [`adopt`], [`handles`]), judged open or closed ([`openness`]), oriented ([`orient`]), reported
+//!   [`star_repair`], [`adopt`], [`handles`]), judged open or closed (`judge`, [`openness`]), oriented ([`orient`]), reported
 //!   ([`report`]) and looked over for faults ([`self_check`]).
 //! * [`mesh_repair`]: a damaged mesh keeps its good triangles; the rest is found anew from its points. [`mend()`] closes holes.
 
@@ -23,6 +23,7 @@ pub mod gap_cost;
 pub mod gap_transforms;
 pub mod handles;
 pub mod islands;
+mod judge;
 pub mod known_queries;
 pub mod known_surface;
 pub mod labelling;
@@ -36,11 +37,12 @@ pub mod prepare;
 pub mod refine;
 pub mod report;
 pub mod self_check;
+pub mod settings;
 pub mod star_repair;
 mod stars;
 
 pub use balls::Balls;
-pub use cloud::{ClosedOrOpen, CloudSegregation, Denoise, SegregationSettings, segregate_cloud};
+pub use cloud::{CloudSegregation, segregate_cloud};
 pub use error::SegregationError;
 pub use gap_cost::CostRule;
 pub use known_queries::KnownSurface;
@@ -55,3 +57,4 @@ pub use prepare::Strength;
 pub use refine::{RefinedSegregation, segregate_known_refined};
 pub use report::CloudReport;
 pub use self_check::{Doubt, DoubtKind};
+pub use settings::{ClosedOrOpen, Denoise, SegregationSettings};

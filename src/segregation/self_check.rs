@@ -16,11 +16,11 @@
 //! Cost: a sweep over the tetrahedra; two more minimum cuts where parts are thin.
 
 use super::closure::Closure;
-use super::cloud::SegregationSettings;
 use super::handles::NarrowHandle;
 use super::labels::{boundary_triangles, mesh_of};
 use super::openness::{Rim, all_unsupported};
 use super::report::{CloudReport, SecondOpinion, Variation};
+use super::settings::SegregationSettings;
 use crate::geometry::{ClosestOnMesh, TriangleMesh};
 use glam::DVec3;
 use rayon::prelude::*;

@@ -20,7 +20,7 @@ pub mod outliers;
 pub mod smooth;
 pub mod thin;
 
-use super::cloud::{Denoise, SegregationSettings};
+use super::settings::{Denoise, SegregationSettings};
 use glam::DVec3;
 use knn::KnnLists;
 use serde::{Deserialize, Serialize};
