@@ -73,10 +73,11 @@ pub fn escape(text: &str) -> String {
     out
 }
 
-/// About `count` round numbers from `lo` to `hi`.
+/// About `count` round numbers from `lo` to `hi`; `lo` alone where they are too near each other to be told apart.
 pub fn ticks(lo: f64, hi: f64, count: usize) -> Vec<f64> {
     let span = hi - lo;
-    if !span.is_finite() || span <= 0.0 {
+    let least = (1e-12 * lo.abs().max(hi.abs())).max(1e-300);
+    if !span.is_finite() || span < least {
         return vec![lo];
     }
     let raw = span / count.max(1) as f64;
@@ -470,6 +471,20 @@ mod tests {
             assert_eq!(pretty(x), text);
         }
         assert_eq!(signed(2.0), "+2");
+    }
+
+    #[test]
+    fn ticks_of_a_range_without_numbers_between_are_one() {
+        for (lo, hi) in [
+            (0.0, 5e-324),
+            (-5e-324, 0.0),
+            (1.0, 1.0 + f64::EPSILON),
+            (1e300, 1e300 * (1.0 + f64::EPSILON)),
+            (f64::MIN, f64::MAX),
+        ] {
+            assert_eq!(ticks(lo, hi, 5), [lo]);
+        }
+        assert!(ticks(0.0, 1e-200, 5).len() > 3 && ticks(-1e300, 1e300, 5).len() > 3);
     }
 
     #[test]
