@@ -33,7 +33,7 @@ pub enum ClosedOrOpen {
     Open,
 }
 
-/// Settings of [`segregate_cloud`].
+/// Settings of [`super::segregate_cloud`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SegregationSettings {
