@@ -9,12 +9,12 @@ use glam::DVec3;
 use medial_scaffold::delaunay::{DelaunaySettings, delaunay};
 use medial_scaffold::geometry::{ClosestOnMesh, SignedDistance, TriangleMesh};
 use medial_scaffold::segregation::{
-    Balls, ChangeKind, ClosedOrOpen, CloudSegregation, KnownSurface, KnownSurfaceSettings, SegregationError,
+    Balls, ChangeKind, ClosedOrOpen, KnownSurface, KnownSurfaceSettings, SegregationError,
     SegregationSettings, segregate_cloud, segregate_known, segregate_known_refined, segregate_mesh,
 };
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use segregation_support::{corrupted, cuboid, data_mesh, sample, shapes, sphere, torus};
+use segregation_support::{
+    cloud, corrupted, cuboid, data_mesh, describe, patch, sample, shapes, sphere, torus,
+};
 use std::f64::consts::TAU;
 
 fn segregate(
@@ -142,31 +142,6 @@ fn the_talus_with_a_hidden_pocket_is_right_or_says_so() {
         refined.result.report.expected_euler
     );
     assert!(refined.result.report.agree || !refined.result.segregation.warnings.is_empty());
-}
-
-/// A cloud of a surface given over the unit square, `n` points at random.
-fn patch(n: usize, seed: u64, at: impl Fn(f64, f64) -> DVec3) -> Vec<DVec3> {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    (0..n).map(|_| at(rng.random(), rng.random())).collect()
-}
-
-fn cloud(points: &[DVec3]) -> CloudSegregation {
-    segregate_cloud(points, &SegregationSettings::default()).expect("a finite cloud that spans space")
-}
-
-fn describe(r: &CloudSegregation) -> String {
-    format!(
-        "{} euler {} open {} nonmanifold {} + {} components {} rims {:?} unsupported {:.3}; {}",
-        if r.segregation.closed { "closed" } else { "open" },
-        r.report.topology.euler,
-        r.report.topology.boundary_edges,
-        r.report.topology.nonmanifold_edges,
-        r.report.topology.nonmanifold_vertices,
-        r.report.topology.components,
-        r.report.rims.iter().map(|r| r.edges).collect::<Vec<_>>(),
-        r.report.decision.unsupported_area_share,
-        r.report.decision.reason
-    )
 }
 
 #[test]

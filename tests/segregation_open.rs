@@ -6,43 +6,12 @@ use glam::DVec3;
 use medial_scaffold::geometry::TriangleMesh;
 use medial_scaffold::input::repair::{RepairSettings, repair};
 use medial_scaffold::segregation::{
-    ClosedOrOpen, CloudSegregation, Denoise, DoubtKind, Mending, SegregationSettings, Strength, mend,
-    segregate_cloud,
+    ClosedOrOpen, Denoise, DoubtKind, Mending, SegregationSettings, Strength, mend, segregate_cloud,
 };
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use segregation_support::{corrupted, data_shape, sample_with_hole, shapes, sphere, torus};
+use segregation_support::{
+    cloud, corrupted, data_shape, describe, patch, sample_with_hole, shapes, sphere, torus,
+};
 use std::f64::consts::TAU;
-
-/// A cloud of a surface given over the unit square, `n` points at random.
-fn patch(n: usize, seed: u64, at: impl Fn(f64, f64) -> DVec3) -> Vec<DVec3> {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    (0..n).map(|_| at(rng.random(), rng.random())).collect()
-}
-
-fn cloud(points: &[DVec3]) -> CloudSegregation {
-    segregate_cloud(points, &SegregationSettings::default()).expect("a finite cloud that spans space")
-}
-
-fn describe(r: &CloudSegregation) -> String {
-    format!(
-        "{} euler {} open {} nonmanifold {} + {} components {:?} rims {:?} unsupported {:.3}; {}; {:?}",
-        if r.segregation.closed { "closed" } else { "open" },
-        r.report.topology.euler,
-        r.report.topology.boundary_edges,
-        r.report.topology.nonmanifold_edges,
-        r.report.topology.nonmanifold_vertices,
-        r.report
-            .components
-            .iter()
-            .map(|c| (c.points, c.euler))
-            .collect::<Vec<_>>(),
-        r.report.rims.iter().map(|r| r.edges).collect::<Vec<_>>(),
-        r.report.decision.unsupported_area_share,
-        r.report.decision.reason,
-        r.report.doubts.iter().map(|d| d.kind).collect::<Vec<_>>(),
-    )
-}
 
 #[test]
 fn a_pair_of_planes_is_two_sheets_with_nothing_between() {

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use medial_scaffold::coarse_scaffold::{CoarseScaffold, CoarseScaffoldSettings, CurveKind, coarse_scaffold};
+use medial_scaffold::delaunay::Triangulation;
 use medial_scaffold::fine_scaffold::{
     Betti, FineScaffold, FineScaffoldSettings, Side, fine_scaffold, mesh_betti, solid_betti,
 };
@@ -9,7 +10,7 @@ use medial_scaffold::geometry::TriangleMesh;
 use medial_scaffold::input::{Geometry, ReadSettings, read_shape};
 use medial_scaffold::regularise::{RegulariseSettings, Regularised, regularise};
 use medial_scaffold::segregation::{
-    KnownSurfaceSettings, SegregationSettings, segregate_cloud, segregate_known_refined,
+    KnownSurfaceSettings, Segregation, SegregationSettings, segregate_cloud, segregate_known_refined,
 };
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -42,32 +43,16 @@ pub fn run(
     surface: &TriangleMesh,
     settings: &RegulariseSettings,
 ) -> Result<Run, Box<dyn Error>> {
-    let t0 = Instant::now();
+    let start = Instant::now();
     let refined = segregate_known_refined(points, surface, &KnownSurfaceSettings::default())?;
-    let t1 = Instant::now();
-    let segregation = &refined.result.segregation;
-    let fine = fine_scaffold(
+    let seconds = start.elapsed().as_secs_f64();
+    rest(
         &refined.triangulation,
-        segregation,
-        &FineScaffoldSettings::default(),
-    )?;
-    let t2 = Instant::now();
-    let regularised = regularise(&fine, settings)?;
-    let t3 = Instant::now();
-    let coarse = coarse_scaffold(&fine, &regularised, &CoarseScaffoldSettings::default());
-    let t4 = Instant::now();
-    Ok(Run {
-        solid: solid_betti(&refined.triangulation, segregation, Side::Interior)
-            .expect("labels of this triangulation"),
-        known: mesh_betti(surface),
-        fine,
-        regularised,
-        coarse,
-        seconds_segregate: (t1 - t0).as_secs_f64(),
-        seconds_fine: (t2 - t1).as_secs_f64(),
-        seconds_regularise: (t3 - t2).as_secs_f64(),
-        seconds_coarse: (t4 - t3).as_secs_f64(),
-    })
+        &refined.result.segregation,
+        mesh_betti(surface),
+        seconds,
+        settings,
+    )
 }
 
 /// Runs all stages on a raw cloud: segregated by its points alone, noise removed as the pipeline does it. `known` are the Betti
@@ -77,29 +62,37 @@ pub fn run_cloud(
     known: Option<Betti>,
     settings: &RegulariseSettings,
 ) -> Result<Run, Box<dyn Error>> {
-    let t0 = Instant::now();
+    let start = Instant::now();
     let cloud = segregate_cloud(points, &SegregationSettings::default())?;
+    let seconds = start.elapsed().as_secs_f64();
+    rest(&cloud.triangulation, &cloud.segregation, known, seconds, settings)
+}
+
+/// The stages after segregation, which took `seconds_segregate`.
+fn rest(
+    triangulation: &Triangulation,
+    segregation: &Segregation,
+    known: Option<Betti>,
+    seconds_segregate: f64,
+    settings: &RegulariseSettings,
+) -> Result<Run, Box<dyn Error>> {
+    let t0 = Instant::now();
+    let fine = fine_scaffold(triangulation, segregation, &FineScaffoldSettings::default())?;
     let t1 = Instant::now();
-    let fine = fine_scaffold(
-        &cloud.triangulation,
-        &cloud.segregation,
-        &FineScaffoldSettings::default(),
-    )?;
-    let t2 = Instant::now();
     let regularised = regularise(&fine, settings)?;
-    let t3 = Instant::now();
+    let t2 = Instant::now();
     let coarse = coarse_scaffold(&fine, &regularised, &CoarseScaffoldSettings::default());
-    let t4 = Instant::now();
+    let t3 = Instant::now();
     Ok(Run {
-        solid: solid_betti(&cloud.triangulation, &cloud.segregation, Side::Interior)?,
+        solid: solid_betti(triangulation, segregation, Side::Interior)?,
         known,
         fine,
         regularised,
         coarse,
-        seconds_segregate: (t1 - t0).as_secs_f64(),
-        seconds_fine: (t2 - t1).as_secs_f64(),
-        seconds_regularise: (t3 - t2).as_secs_f64(),
-        seconds_coarse: (t4 - t3).as_secs_f64(),
+        seconds_segregate,
+        seconds_fine: (t1 - t0).as_secs_f64(),
+        seconds_regularise: (t2 - t1).as_secs_f64(),
+        seconds_coarse: (t3 - t2).as_secs_f64(),
     })
 }
 

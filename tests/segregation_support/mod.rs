@@ -3,6 +3,7 @@
 
 use glam::DVec3;
 use medial_scaffold::geometry::TriangleMesh;
+use medial_scaffold::segregation::{CloudSegregation, SegregationSettings, segregate_cloud};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::{PI, TAU};
@@ -406,4 +407,36 @@ pub fn all_shapes() -> Vec<(String, TriangleMesh)> {
                 .filter_map(|(name, path)| Some((name.to_owned(), data_shape(path)?))),
         )
         .collect()
+}
+
+/// A cloud of a surface given over the unit square, `n` points at random.
+pub fn patch(n: usize, seed: u64, at: impl Fn(f64, f64) -> DVec3) -> Vec<DVec3> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    (0..n).map(|_| at(rng.random(), rng.random())).collect()
+}
+
+/// Segregates with the settings as they come.
+pub fn cloud(points: &[DVec3]) -> CloudSegregation {
+    segregate_cloud(points, &SegregationSettings::default()).expect("a finite cloud that spans space")
+}
+
+/// What a test prints of a result.
+pub fn describe(r: &CloudSegregation) -> String {
+    format!(
+        "{} euler {} open {} nonmanifold {} + {} components {:?} rims {:?} unsupported {:.3}; {}; {:?}",
+        if r.segregation.closed { "closed" } else { "open" },
+        r.report.topology.euler,
+        r.report.topology.boundary_edges,
+        r.report.topology.nonmanifold_edges,
+        r.report.topology.nonmanifold_vertices,
+        r.report
+            .components
+            .iter()
+            .map(|c| (c.points, c.euler))
+            .collect::<Vec<_>>(),
+        r.report.rims.iter().map(|r| r.edges).collect::<Vec<_>>(),
+        r.report.decision.unsupported_area_share,
+        r.report.decision.reason,
+        r.report.doubts.iter().map(|d| d.kind).collect::<Vec<_>>(),
+    )
 }
