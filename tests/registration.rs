@@ -334,6 +334,55 @@ fn a_fragment_finds_its_place_on_the_whole() {
     assert!(found.overlap > 0.95 && found.overlap_target < 0.7);
 }
 
+/// Points of a plate 1 mm thick, hollow from above, with a hump that is a hollow from below and two that are not; those whose flat
+/// normal and place `keep` wants.
+fn plate(count: usize, keep: impl Fn(DVec3, DVec3) -> bool, seed: u64) -> Vec<DVec3> {
+    let slab = datasets_synthetic::ShapeKind::Slab
+        .shape(0)
+        .expect("a single shape");
+    let cloud = slab.sample_uniform(count, seed);
+    let hump = |p: DVec3| {
+        let at = |x: f64, y: f64| (-((p.x - x).powi(2) + (p.y - y).powi(2)) / 6.0).exp();
+        let upper = if p.z > 0.0 { 0.5 } else { 0.0 };
+        let up = at(5.0, 2.0) + upper * (at(-4.0, 2.5) + at(1.0, -3.0));
+        p + DVec3::Z * (up + 0.015 * p.x * p.x)
+    };
+    let kept = cloud.points.iter().zip(&cloud.normals);
+    kept.filter(|(p, n)| keep(**p, **n))
+        .map(|(&p, _)| hump(p))
+        .collect()
+}
+
+#[test]
+fn a_thin_plate_keeps_its_two_faces() {
+    // The walls are two spacings of the cloud apart: taken for one noisy sheet, they would have no outside.
+    let target = plate(4000, |_, _| true, 3);
+    let clean = clean_cloud(&target).expect("a cloud");
+    assert!(clean.noise_mm < 0.05, "noise {} mm of none", clean.noise_mm);
+    // One face without its edge, seen from above and from below: nothing in such a cloud says which face is outside.
+    for side in [1.0, -1.0] {
+        let inner = |p: DVec3, n: DVec3| n.z * side > 0.9 && p.x.abs() < 9.0 && p.y.abs() < 6.0;
+        let motion = motion(5);
+        let face: Vec<DVec3> = plate(6000, inner, 4).iter().map(|&p| motion.apply(p)).collect();
+        let found = register(
+            &RegistrationShape::cloud(&target),
+            &RegistrationShape::cloud(&face),
+            &RegistrationSettings::default(),
+        )
+        .expect("sound clouds");
+        let error = error_deg(&found, &motion);
+        assert!(error < 2.0, "face {side}: {error} degrees, {:?}", found.ambiguity);
+        let middle = motion.apply(DVec3::ZERO);
+        let place = found.T_target_source.apply(middle).length();
+        assert!(place < 0.3, "face {side}: {place} mm off, {:?}", found.ambiguity);
+        let (score, doubts) = (found.score, &found.ambiguity);
+        assert!(
+            score > 0.3 && doubts.is_empty(),
+            "face {side}: {score}, {doubts:?}"
+        );
+    }
+}
+
 #[test]
 fn a_growth_does_not_drag_the_rest_along() {
     let target = lump(1.0);

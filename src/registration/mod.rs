@@ -12,7 +12,8 @@
 //! | file | idea |
 //! |---|---|
 //! | `shape`, `settings`, `result` | what goes in and what comes out |
-//! | `oriented`, `isolated`, `denoise`, `cells`, `nearest_grid`, `exact` | a surface prepared for search |
+//! | `oriented`, `isolated`, `denoise`, `walls`, `cells`, `nearest_grid`, `exact` | a surface prepared for search |
+//! | `faces` | which hand and which face of a thin sheet may be outside |
 //! | `surface` | whole shapes |
 //! | `partial`, `pairs` | partial shapes |
 //! | `score`, `refine`, `solve` | shared by both: free space, closest points, one linear step |
@@ -27,6 +28,7 @@ mod cells;
 mod denoise;
 pub mod difference;
 mod exact;
+mod faces;
 mod isolated;
 mod nearest_grid;
 mod oriented;
@@ -42,6 +44,7 @@ mod significance;
 mod solve;
 mod surface;
 mod verdict;
+mod walls;
 
 pub use denoise::{CleanCloud, clean_cloud};
 pub use difference::{Difference, SheetContext, SheetDifference, difference};

@@ -201,6 +201,22 @@ impl View {
         image
     }
 
+    /// The same surface with the other face outside.
+    pub(crate) fn turned(&self) -> Self {
+        let mut turned = Self::assemble(
+            self.points.clone(),
+            self.normals.iter().map(|n| -*n).collect(),
+            self.border.clone(),
+            self.spacing,
+            Some(self.exact.clone()),
+            self.vertices.clone(),
+            self.noise,
+            self.centre,
+        );
+        turned.mirrored = self.mirrored;
+        turned
+    }
+
     /// Root mean square distance of the samples from their centroid.
     pub(crate) fn gyration(&self) -> f64 {
         self.moments.deviations.length()

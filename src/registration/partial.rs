@@ -65,9 +65,9 @@ const MIDDLE: ScoreScale = ScoreScale {
     violation: 1.75,
 };
 /// A second round is not needed above this score: half-overlapping bones at 1 % noise have it.
-const GOOD_SCORE: f64 = 0.4;
+pub(crate) const GOOD_SCORE: f64 = 0.4;
 /// ... when every rival is this far below: the most that a wrong pose was ahead of its rivals is 0.22.
-const CLEAR_MARGIN: f64 = 0.4;
+pub(crate) const CLEAR_MARGIN: f64 = 0.4;
 /// A rival is a pose farther than this, degrees.
 pub(crate) const RIVAL_DEG: f64 = 15.0;
 

@@ -1,20 +1,22 @@
 //! The front door: which pose is reported, and what is said of it.
 //!
-//! 1. Both surfaces become views in one unit, raw clouds without their clutter; for `mirror auto` the source's mirror image too.
+//! 1. Both surfaces become views in one unit, raw clouds without their clutter; for `mirror auto` the source's mirror image too, for a
+//!    sheet whose face is unknown the turned one.
 //! 2. Whole search for every allowed handedness. It is believed at once when both surfaces agree nearly everywhere, or when both
 //!    are closed and differ by no more than two persons' bones do.
 //! 3. Otherwise the partial search runs too, and wins when free space says so; a doubt is raised when the whole pose is another one
 //!    and neither shape has a part that the other lacks.
 //! 4. A mirrored pose must be clearly better than an unmirrored one.
 
+use super::faces::{ViewPair, pairs};
 use super::isolated::without_isolated;
 use super::oriented::{self, View};
-use super::partial::{self, RIVAL_DEG};
+use super::partial::{self, CLEAR_MARGIN, GOOD_SCORE, RIVAL_DEG};
 use super::precision::standard_errors;
 use super::refine::{Level, equations, rest, resting_level};
 use super::result::{Conditioning, Hypothesis, Method, Precision, Registration};
 use super::score::{FINE, both_ways};
-use super::settings::{Extent, Mirror, RegistrationSettings};
+use super::settings::{Extent, RegistrationSettings};
 use super::shape::{RegistrationError, RegistrationShape, Surface};
 use super::significance::lead;
 use super::surface::{self, Distances, WholeFit};
@@ -50,6 +52,8 @@ const PARTIAL_MARGIN: f64 = 0.1;
 #[derive(Clone, Debug)]
 struct Candidate {
     pose: Rigid,
+    /// Which of [`Search::pairs`] it lays on each other.
+    pair: usize,
     mirrored: bool,
     method: Method,
     /// Symmetric distance (units) for whole poses, score for partial ones.
@@ -102,21 +106,13 @@ pub fn register(
         || View::new(target, unit, settings.samples, settings.seed),
         || View::new(source, unit, settings.samples, settings.seed.wrapping_add(1)),
     );
-    let sources = match settings.mirror {
-        Mirror::No => vec![source_view],
-        Mirror::Yes => vec![source_view.mirror_image()],
-        Mirror::Auto => {
-            let image = source_view.mirror_image();
-            vec![source_view, image]
-        }
-    };
-    let guesses: Vec<Vec<Rigid>> = sources
+    let pairs = pairs(target_view, source_view, settings.mirror);
+    let guesses: Vec<Vec<Rigid>> = pairs
         .par_iter()
-        .map(|view| scaffold_guesses(target, source, &target_view, view, unit, settings))
+        .map(|pair| scaffold_guesses(target, source, pair, unit, settings))
         .collect();
     let search = Search {
-        target: &target_view,
-        sources: &sources,
+        pairs: &pairs,
         guesses: &guesses,
         settings,
     };
@@ -151,14 +147,14 @@ fn of_kept<'a>(shape: &RegistrationShape<'a>, kept: &'a Option<Vec<DVec3>>) -> R
 fn scaffold_guesses(
     target: &RegistrationShape,
     source: &RegistrationShape,
-    target_view: &View,
-    source_view: &View,
+    pair: &ViewPair,
     unit: f64,
     settings: &RegistrationSettings,
 ) -> Vec<Rigid> {
     let (Some(t), Some(s)) = (target.scaffold, source.scaffold) else {
         return Vec::new();
     };
+    let (target_view, source_view) = (&pair.target, &pair.source);
     let matching = MatchingSettings {
         mirrored: source_view.mirrored,
         seed: settings.seed,
@@ -188,17 +184,23 @@ fn mirror_of(mirrored: bool) -> DMat3 {
 }
 
 struct Search<'a> {
-    target: &'a View,
-    sources: &'a [View],
-    /// First guesses from the scaffolds, in view coordinates, one list a source view.
+    pairs: &'a [ViewPair],
+    /// First guesses from the scaffolds, in view coordinates, one list a pair.
     guesses: &'a [Vec<Rigid>],
     settings: &'a RegistrationSettings,
 }
 
 impl Search<'_> {
-    fn view(&self, mirrored: bool) -> &View {
-        let matching = self.sources.iter().find(|v| v.mirrored == mirrored);
-        matching.expect("candidates come from these views")
+    /// Source and target as a candidate takes them.
+    fn views(&self, c: &Candidate) -> (&View, &View) {
+        let pair = &self.pairs[c.pair];
+        (&pair.source, &pair.target)
+    }
+
+    /// Either handedness is allowed.
+    fn both_hands(&self) -> bool {
+        let mirrored = |pair: &&ViewPair| pair.source.mirrored;
+        self.pairs.iter().any(|p| mirrored(&p)) && !self.pairs.iter().all(|p| mirrored(&p))
     }
 
     /// All verified poses, the chosen one first, and a doubt that only the other search can raise.
@@ -213,10 +215,7 @@ impl Search<'_> {
         let partial = self.partial();
         match (whole.first(), partial.first()) {
             (Some(w), Some(p)) if p.score > w.score + PARTIAL_MARGIN => {
-                let angle = w.pose.rotation_angle_deg(&p.pose);
-                let doubt = (angle > WHOLE_TOO_DEG && self.nothing_missing(w)).then(|| {
-                    format!("neither shape lacks a part, and as wholes they fit {angle:.0} degrees away")
-                });
+                let doubt = self.doubt_of_part(w, p);
                 (partial, doubt)
             }
             (None, _) => (partial, None),
@@ -225,21 +224,43 @@ impl Search<'_> {
     }
 
     fn believed(&self, fit: &Candidate) -> bool {
-        let source = self.view(fit.mirrored);
-        let closed = source.closed && self.target.closed;
+        let (source, target) = self.views(fit);
+        let closed = source.closed && target.closed;
         fit.score > SURELY_WHOLE || (closed && fit.rms < ONE_KIND)
+    }
+
+    /// What speaks against a partial pose `p` of shapes that show no cut, `w` being the best pose of them as wholes.
+    fn doubt_of_part(&self, w: &Candidate, p: &Candidate) -> Option<String> {
+        if self.cut(p) {
+            return None;
+        }
+        let angle = w.pose.rotation_angle_deg(&p.pose);
+        if angle > WHOLE_TOO_DEG && self.nothing_missing(w) {
+            let text = format!("neither shape lacks a part, and as wholes they fit {angle:.0} degrees away");
+            return Some(text);
+        }
+        // Nothing is cut off, so the shapes differ; what they share may then be a likeness.
+        (p.score < GOOD_SCORE).then(|| {
+            format!(
+                "neither shape is cut, and yet their surfaces agree in part only: score {:.2}",
+                p.score
+            )
+        })
+    }
+
+    /// One of the surfaces shows the rim of a cut. Two halves of a ball fit each other without being wholes of anything; but each has
+    /// a rim, unless noise hides it. So a missing rim raises a doubt and does not decide: a half of a triquetrum at 2 % noise fits
+    /// the other upside down.
+    fn cut(&self, fit: &Candidate) -> bool {
+        let (source, target) = self.views(fit);
+        let rim = |v: &View| v.border.iter().filter(|b| **b).count() as f64 / v.border.len().max(1) as f64;
+        rim(source).max(rim(target)) > CUT_RIM
     }
 
     /// Neither surface has a part that the other lacks: a cut leaves many points farther away than two bones of one kind differ.
     fn nothing_missing(&self, fit: &Candidate) -> bool {
-        let source = self.view(fit.mirrored);
-        let rim = |v: &View| v.border.iter().filter(|b| **b).count() as f64 / v.border.len().max(1) as f64;
-        // Two halves of a ball fit each other without being wholes of anything; but each shows the rim of its cut, unless noise
-        // hides it. So this raises a doubt and does not decide: a half of a triquetrum at 2 % noise fits the other upside down.
-        if rim(source).max(rim(self.target)) > CUT_RIM {
-            return false;
-        }
-        let d = Distances::new(source, self.target, &fit.pose, 2000);
+        let (source, target) = self.views(fit);
+        let d = Distances::new(source, target, &fit.pose, 2000);
         [&d.there, &d.back]
             .iter()
             .all(|d| d.iter().filter(|d| **d > ONE_KIND).count() <= d.len() / 100)
@@ -248,10 +269,10 @@ impl Search<'_> {
     fn whole(&self) -> Vec<Candidate> {
         let scale = self.settings.scale;
         let mut surveys: Vec<Vec<WholeFit>> = self
-            .sources
+            .pairs
             .iter()
             .zip(self.guesses)
-            .map(|(source, guesses)| surface::survey(source, self.target, guesses, scale, 4))
+            .map(|(pair, guesses)| surface::survey(&pair.source, &pair.target, guesses, scale, 4))
             .collect();
         let least = |fits: &[WholeFit]| fits.first().map_or(f64::INFINITY, |f| f.rms);
         let best = surveys
@@ -259,38 +280,57 @@ impl Search<'_> {
             .map(|fits| least(fits))
             .fold(f64::INFINITY, f64::min);
         let mut out: Vec<Candidate> = Vec::new();
-        for (source, fits) in self.sources.iter().zip(&mut surveys) {
+        for (index, (pair, fits)) in self.pairs.iter().zip(&mut surveys).enumerate() {
+            let (source, target) = (&pair.source, &pair.target);
             // A hand that has lost clearly is reported as it was surveyed.
             if least(fits) <= LOST_HAND * best.max(INDISTINCT) {
-                surface::finish(source, self.target, fits, scale);
+                surface::finish(source, target, fits, scale);
             }
             out.extend(fits.iter().map(|fit| Candidate {
-                score: both_ways(source, self.target, &fit.pose, usize::MAX, FINE),
+                score: both_ways(source, target, &fit.pose, usize::MAX, FINE),
                 pose: fit.pose,
+                pair: index,
                 mirrored: source.mirrored,
                 method: Method::Whole,
                 rms: fit.rms,
                 converged: fit.converged,
             }));
         }
+        let both_hands = self.both_hands();
         let cost = |c: &Candidate| {
-            if c.mirrored && self.sources.len() > 1 {
+            if c.mirrored && both_hands {
                 c.rms / MIRROR_SHARE
             } else {
                 c.rms
             }
         };
         out.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
-        out
+        self.without_other_face(out)
+    }
+
+    /// Distances do not tell the faces of a sheet apart: of two candidates in one pose, one with the other face outside, free space
+    /// keeps the better.
+    fn without_other_face(&self, all: Vec<Candidate>) -> Vec<Candidate> {
+        let better = |c: &Candidate, o: &Candidate| {
+            o.pair != c.pair
+                && o.mirrored == c.mirrored
+                && o.score > c.score
+                && o.pose.rotation_angle_deg(&c.pose) < surface::SAME_POSE_DEG
+        };
+        let lost: Vec<bool> = all.iter().map(|c| all.iter().any(|o| better(c, o))).collect();
+        let kept = all.into_iter().zip(lost).filter(|(_, lost)| !lost);
+        kept.map(|(c, _)| c).collect()
     }
 
     fn partial(&self) -> Vec<Candidate> {
         let s = self.settings;
         let mut out: Vec<Candidate> = Vec::new();
-        for (source, guesses) in self.sources.iter().zip(self.guesses) {
-            let fits = partial::partial(source, self.target, guesses, s.poses, s.escalated_poses, s.seed);
+        for (index, (pair, guesses)) in self.pairs.iter().zip(self.guesses).enumerate() {
+            let (source, target) = (&pair.source, &pair.target);
+            let fits = partial::partial(source, target, guesses, s.poses, s.escalated_poses, s.seed);
             out.extend(fits.into_iter().map(|fit| Candidate {
                 pose: fit.pose,
+                pair: index,
                 mirrored: source.mirrored,
                 method: Method::Partial,
                 rms: 0.0,
@@ -298,8 +338,9 @@ impl Search<'_> {
                 converged: true,
             }));
         }
+        let both_hands = self.both_hands();
         let gain = |c: &Candidate| {
-            if c.mirrored && self.sources.len() > 1 {
+            if c.mirrored && both_hands {
                 c.score - MIRROR_MARGIN
             } else {
                 c.score
@@ -311,9 +352,8 @@ impl Search<'_> {
             c.rms = self.measure(c).rms;
         }
         if let Some(best) = out.first_mut() {
-            let source = self.sources.iter().find(|v| v.mirrored == best.mirrored);
-            let source = source.expect("the candidate came from it");
-            (best.pose, best.converged) = rest(source, self.target, best.pose, false);
+            let (source, target) = self.views(best);
+            (best.pose, best.converged) = rest(source, target, best.pose, false);
         }
         out
     }
@@ -324,7 +364,7 @@ impl Search<'_> {
         let Some(best) = candidates.first().cloned() else {
             return self.nothing(unit);
         };
-        let source = self.view(best.mirrored);
+        let (source, target) = self.views(&best);
         let fit = self.measure(&best);
         let ambiguity = self.ambiguity(&candidates);
         let hypotheses = candidates
@@ -356,7 +396,7 @@ impl Search<'_> {
             conditioning: self.conditioning(&best),
             precision: self.precision(&best, unit),
             noise_source: source.noise * unit,
-            noise_target: self.target.noise * unit,
+            noise_target: target.noise * unit,
         }
     }
 
@@ -364,7 +404,8 @@ impl Search<'_> {
     fn nothing(&self, unit: f64) -> Registration {
         let pose = Candidate {
             pose: Rigid::IDENTITY,
-            mirrored: self.sources[0].mirrored,
+            pair: 0,
+            mirrored: self.pairs[0].source.mirrored,
             method: Method::Partial,
             rms: 0.0,
             score: 0.0,
@@ -392,8 +433,12 @@ impl Search<'_> {
                 if let Some(r) = rival.filter(|r| r.rms < s.rival_residual * best.rms.max(INDISTINCT)) {
                     let angle = r.pose.rotation_angle_deg(&best.pose);
                     let ratio = r.rms / best.rms.max(INDISTINCT);
-                    let lead = lead(self.view(best.mirrored), self.target, &best.pose, &r.pose);
-                    if lead < s.rival_lead || r.rms < s.rival_residual * INDISTINCT {
+                    let (source, target) = self.views(best);
+                    let lead = lead(source, target, &best.pose, &r.pose);
+                    // Where a part is missing, distances say less than what lies in free space does.
+                    let open = !(source.closed && target.closed);
+                    let by_free_space = open && best.score > r.score + CLEAR_MARGIN;
+                    if (lead < s.rival_lead && !by_free_space) || r.rms < s.rival_residual * INDISTINCT {
                         reasons.push(format!(
                             "a pose {angle:.0} degrees away has only {ratio:.2} times the residual, a lead of {lead:.1} standard \
                              errors over the surface"
@@ -433,7 +478,7 @@ impl Search<'_> {
 
     /// The motion from the source's frame to the target's, mm.
     fn in_mm(&self, c: &Candidate, unit: f64) -> Rigid {
-        let source = self.view(c.mirrored);
+        let (source, target) = self.views(c);
         let mirror = if c.mirrored {
             DVec3::new(-1.0, 1.0, 1.0)
         } else {
@@ -442,7 +487,7 @@ impl Search<'_> {
         let linear = c.pose.linear * DMat3::from_diagonal(mirror);
         Rigid {
             linear,
-            translation: self.target.centre + c.pose.translation * unit - linear * source.centre,
+            translation: target.centre + c.pose.translation * unit - linear * source.centre,
         }
     }
 
@@ -455,21 +500,22 @@ impl Search<'_> {
             exact: false,
             cosine: 0.5,
         };
-        let rows = equations(self.view(c.mirrored), self.target, &c.pose, level, level.from);
-        rows.conditioning(self.target.gyration(), self.settings.sliding_share)
+        let (source, target) = self.views(c);
+        let rows = equations(source, target, &c.pose, level, level.from);
+        rows.conditioning(target.gyration(), self.settings.sliding_share)
     }
 
     fn precision(&self, c: &Candidate, unit: f64) -> Option<Precision> {
-        let source = self.view(c.mirrored);
-        let level = resting_level(source, self.target);
-        let robust = c.method == Method::Partial || surface::ends_close(source, self.target, c.rms);
+        let (source, target) = self.views(c);
+        let level = resting_level(source, target);
+        let robust = c.method == Method::Partial || surface::ends_close(source, target, c.rms);
         // An untruncated fit used every pair; beyond four of its distances hardly any is left.
         let tolerance = if robust {
             level.to
         } else {
             level.to.max(4.0 * c.rms)
         };
-        let found = standard_errors(source, self.target, &c.pose, level, tolerance, robust)?;
+        let found = standard_errors(source, target, &c.pose, level, tolerance, robust)?;
         Some(Precision {
             rotation_deg: found.rotation.to_degrees(),
             translation_mm: found.translation * unit,
@@ -478,8 +524,8 @@ impl Search<'_> {
 
     /// Distances and overlap of a pose.
     fn measure(&self, c: &Candidate) -> Measured {
-        let source = self.view(c.mirrored);
-        let d = Distances::new(source, self.target, &c.pose, usize::MAX);
+        let (source, target) = self.views(c);
+        let d = Distances::new(source, target, &c.pose, usize::MAX);
         let share = |d: &[f64]| d.iter().filter(|d| **d < ON_SURFACE).count() as f64 / d.len().max(1) as f64;
         let (overlap, overlap_target) = (share(&d.there), share(&d.back));
         let counted = match c.method {
@@ -496,7 +542,7 @@ impl Search<'_> {
                 .par_iter()
                 .map(|&v| {
                     let q = c.pose.apply(v);
-                    self.target.exact.touch(q).place.distance(q)
+                    target.exact.touch(q).place.distance(q)
                 })
                 .collect();
             max = at_vertices.into_iter().fold(max, f64::max);
