@@ -255,6 +255,51 @@ fn a_bone_with_a_hole_is_mended() {
 }
 
 #[test]
+fn a_bone_whose_rims_touch_is_closed_and_keeps_its_triangles() {
+    let Some(bone) = data_shape("carpal_myosim_apache2/frameB/pisiform.stl") else {
+        return;
+    };
+    let faces = repair(&bone, &RepairSettings::default());
+    // Two triangles that hang on edges of others; all else stays.
+    assert_eq!(faces.changes.wall_triangles, 2);
+    let mended = mend(&faces.mesh, &SegregationSettings::default()).expect("a mesh");
+    assert_eq!(mended.mending, Mending::Grafted, "{:?}", mended.lines());
+    assert!(mended.mesh.triangles.starts_with(&faces.mesh.triangles));
+    let t = mended.mesh.topology();
+    assert!(t.watertight && t.oriented && t.nonmanifold_vertices == 0, "{t:?}");
+}
+
+#[test]
+fn bad_meshes_of_many_parts_keep_them() {
+    // Neurites and skulls whose parts touch, lie on one another and cross: no part may be lost in the repair. In the first
+    // neuron four edges of three triangles stay, and are said.
+    for (file, open, odd) in [
+        ("neuron_hemibrain_localonly/1734350788.obj", 12, 4),
+        ("neuron_hemibrain_localonly/722817260.obj", 0, 0),
+        ("neuron_hemibrain_localonly/754534424.obj", 0, 0),
+        ("mouse_skull_localonly/A_J.ply", 0, 0),
+        ("mouse_skull_localonly/BALB_CJ.ply", 0, 0),
+    ] {
+        let Some(given) = data_shape(file) else { return };
+        let faces = repair(&given, &RepairSettings::default());
+        let mended = mend(&faces.mesh, &SegregationSettings::default()).expect("a mesh");
+        println!("{file}: {:?} {:?}", faces.changes.lines(), mended.warnings());
+        let t = mended.mesh.topology();
+        assert_eq!((t.boundary_edges, t.nonmanifold_edges), (open, odd), "{file}");
+        assert!(mended.mesh.triangles.starts_with(&faces.mesh.triangles));
+        let ratio = mended.mesh.area() / given.area();
+        assert!((0.95..=1.0).contains(&ratio), "{file}: {ratio} of its area");
+        if open + odd == 0 {
+            assert!(t.watertight && t.oriented && t.nonmanifold_vertices == 0, "{t:?}");
+            assert!(mended.warnings().is_empty());
+        } else {
+            assert_eq!(mended.mending, Mending::LeftDamaged);
+            assert_eq!(mended.warnings().len(), 1);
+        }
+    }
+}
+
+#[test]
 fn a_hole_of_four_per_cent_is_seen_where_the_shape_is_curved() {
     let slow = std::env::var_os("MEDIAL_SLOW").is_some();
     let seeds = if slow { 10 } else { 2 };

@@ -61,8 +61,8 @@ pub struct Common {
     #[arg(long, value_name = "N", global = true, help_heading = "Input")]
     pub label: Option<i32>,
 
-    /// Mend meshes before use: join equal points, drop useless faces, turn faces outward, close holes; what was changed is
-    /// listed.
+    /// Mend meshes before use: join equal points, drop useless faces, turn faces outward, take apart what touches itself in
+    /// an edge, close holes; what was changed is listed.
     #[arg(long, global = true, help_heading = "Input")]
     pub repair: bool,
 

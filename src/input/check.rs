@@ -380,7 +380,7 @@ fn mesh_problems(m: &MeshCheck, problems: &mut Vec<Problem>) {
         t.nonmanifold_edges > 0,
         Severity::Warning,
         format!("{} edges have three or more triangles", t.nonmanifold_edges),
-        repair,
+        "repair drops useless faces and takes apart what touches itself in an edge",
     );
     push(
         m.orientation == Orientation::OneSided,
@@ -410,7 +410,7 @@ fn mesh_problems(m: &MeshCheck, problems: &mut Vec<Problem>) {
         t.nonmanifold_vertices > 0,
         Severity::Warning,
         format!("the surface touches itself in {} points", t.nonmanifold_vertices),
-        "",
+        "repair takes it apart there",
     );
     push(
         m.twin_points > 0,

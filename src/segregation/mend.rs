@@ -9,16 +9,19 @@
 //!    that triangles which are no Delaunay facets stay too.
 //! 3. A rim left after that, when it is one simple loop, is closed by its triangulation of least area (Barequet & Sharir
 //!    1995), found by dynamic programming.
-//! 4. When rims are still left (rims that touch, faces that cross, edges with three faces) the whole segregated surface is
-//!    taken instead, and every triangle that it replaces is listed.
+//! 4. When that leaves rims (points that lie on one another lead a patch astray) every rim is closed as in step 3.
+//! 5. When rims are still left (edges with three faces, very long rims) the whole segregated surface is taken instead, and every
+//!    triangle that it replaces is listed. It must not drop more than one triangle in twenty, though: a surface found anew from
+//!    too few points for its thinnest parts would lose them. Then the mesh is left as it was, and that is said.
 //!
 //! Cost: as for a cloud of its points.
 
 use super::error::SegregationError;
-use super::mesh_repair::{ChangeKind, MeshRepairReport, segregate_mesh};
+use super::mesh_repair::{Change, ChangeKind, MeshRepairReport, segregate_mesh};
 use super::openness::{area, open_edges};
 use super::report::CloudReport;
-use super::settings::SegregationSettings;
+use super::self_check::{Doubt, DoubtKind};
+use super::settings::{ClosedOrOpen, SegregationSettings};
 use crate::geometry::TriangleMesh;
 use crate::geometry::mesh::DisjointSets;
 use glam::DVec3;
@@ -38,7 +41,13 @@ pub enum Mending {
     Rebuilt,
     /// It is an open surface, and left so.
     LeftOpen,
+    /// No way to close it kept its parts: left as it was.
+    LeftDamaged,
 }
+
+/// Largest part of the triangles that the surface found anew may drop. A bone with damaged patches loses under one in a hundred,
+/// neurites thinner than their points are apart one in two.
+const MOST_STRAY: f64 = 0.05;
 
 /// A mended mesh.
 #[derive(Clone, Debug, Default)]
@@ -49,6 +58,8 @@ pub struct MendedMesh {
     pub mending: Mending,
     /// Rim edges before.
     pub rim_edges: usize,
+    /// Triangles that a surface found anew from the points would drop, where one was asked for.
+    pub would_drop: usize,
     /// The segregation behind it: decision, holes that were filled, rims that were left, doubts, changes (`repair`).
     pub segregation: CloudReport,
 }
@@ -56,12 +67,19 @@ pub struct MendedMesh {
 impl MendedMesh {
     /// What a user should be told: the changes and the doubts.
     pub fn warnings(&self) -> Vec<String> {
+        let done = match self.mending {
+            Mending::LeftOpen | Mending::LeftDamaged => "not repaired",
+            Mending::NotNeeded | Mending::Grafted | Mending::Rebuilt => "repaired",
+        };
         let mut out: Vec<String> = self
             .lines()
             .into_iter()
-            .map(|line| format!("repaired: {line}"))
+            .map(|line| format!("{done}: {line}"))
             .collect();
-        out.extend(self.segregation.doubts.iter().map(|d| d.text.clone()));
+        // The doubt about a mesh left damaged is the line itself.
+        if self.mending != Mending::LeftDamaged {
+            out.extend(self.segregation.doubts.iter().map(|d| d.text.clone()));
+        }
         out
     }
 
@@ -108,6 +126,17 @@ impl MendedMesh {
                     }
                 }
             }
+            Mending::LeftDamaged => {
+                let t = self.mesh.topology();
+                out.push(format!(
+                    "{} open edges and {} edges with three or more triangles were left: a surface found anew from the points \
+                     would drop {} of {} triangles",
+                    t.boundary_edges,
+                    t.nonmanifold_edges,
+                    self.would_drop,
+                    self.mesh.triangles.len()
+                ));
+            }
             Mending::LeftOpen => out.push(format!(
                 "{} open edges were left: {}",
                 self.rim_edges, self.segregation.decision.reason
@@ -137,16 +166,15 @@ pub fn mend(mesh: &TriangleMesh, settings: &SegregationSettings) -> Result<Mende
         ..Default::default()
     };
     if before.boundary_edges + before.nonmanifold_edges == 0 {
+        out.segregation.decision.closed = true;
+        out.segregation.decision.reason = "closed as given".to_owned();
         return Ok(out);
     }
-    let found = segregate_mesh(&mesh.points, &mesh.triangles, settings)?;
-    out.segregation = found.cloud.report;
-    out.segregation.repair = Some(found.report);
-    if !found.cloud.segregation.closed {
-        out.mending = Mending::LeftOpen;
-        out.segregation.repair = Some(kept_all(mesh, 0));
-        return Ok(out);
+    let mut settings = settings.clone();
+    if before.boundary_edges == 0 && settings.closed == ClosedOrOpen::Auto {
+        settings.closed = ClosedOrOpen::Closed;
     }
+    let found = segregate_mesh(&mesh.points, &mesh.triangles, &settings)?;
     let surface: Vec<[u32; 3]> = found
         .cloud
         .segregation
@@ -154,20 +182,48 @@ pub fn mend(mesh: &TriangleMesh, settings: &SegregationSettings) -> Result<Mende
         .iter()
         .map(|t| t.map(|v| found.cloud.source[v.index()]))
         .collect();
-    let mut grafted = graft(mesh, &surface);
-    for rim in simple_rims(&grafted.triangles) {
-        let patch = least_area(&grafted.points, &rim);
-        grafted.triangles.extend(patch);
+    let closed = found.cloud.segregation.closed;
+    out.segregation = found.cloud.report;
+    if !closed {
+        out.mending = Mending::LeftOpen;
+        out.segregation.repair = Some(kept_all(mesh, 0));
+        return Ok(out);
     }
-    let after = grafted.topology();
-    if after.watertight && after.nonmanifold_vertices <= before.nonmanifold_vertices {
+    let closed_up = |mut mesh: TriangleMesh| {
+        for rim in simple_rims(&mesh.triangles) {
+            let patch = least_area(&mesh.points, &rim);
+            mesh.triangles.extend(patch);
+        }
+        let after = mesh.topology();
+        (after.watertight && after.nonmanifold_vertices <= before.nonmanifold_vertices).then_some(mesh)
+    };
+    let grafted = closed_up(graft(mesh, &surface)).or_else(|| closed_up(mesh.clone()));
+    let stray = |c: &&Change| c.kind == ChangeKind::Stray;
+    out.would_drop = found.report.changes.iter().filter(stray).count();
+    if let Some(grafted) = grafted {
         let added = grafted.triangles.len() - mesh.triangles.len();
         out.segregation.repair = Some(kept_all(mesh, added));
+        // What else was doubted is the surface of the points, of which at most some patches are used.
+        out.segregation
+            .doubts
+            .retain(|d| d.kind == DoubtKind::OpenOrClosed);
         out.mesh = grafted;
         out.mending = Mending::Grafted;
-    } else {
+    } else if out.would_drop as f64 <= MOST_STRAY * mesh.triangles.len() as f64 {
+        out.segregation.repair = Some(found.report);
         out.mesh.triangles = surface;
         out.mending = Mending::Rebuilt;
+    } else {
+        out.segregation.repair = Some(kept_all(mesh, 0));
+        out.segregation.filled_holes.clear();
+        out.mending = Mending::LeftDamaged;
+        out.segregation.doubts = vec![Doubt {
+            kind: DoubtKind::PartCutOff,
+            value: out.would_drop as f64 / mesh.triangles.len() as f64,
+            limit: MOST_STRAY,
+            place: None,
+            text: out.lines().concat(),
+        }];
     }
     Ok(out)
 }

@@ -8,16 +8,23 @@
 //!    cancel (two faces back to back enclose nothing), unless the whole mesh is a sheet given with both its sides. Faces
 //!    without area on three points stay: they hold the surface closed.
 //! 3. Faces are turned to agree across every edge with two faces.
-//! 4. A closed component that no other encloses is turned outward. One that lies inside another keeps the turn the file gave it
+//! 4. Walls and fins that bound nothing are dropped ([`walls`]).
+//! 5. Where the surface touches itself in an edge or in a point it is taken apart ([`cut`]); points there are copied.
+//! 6. A closed component that no other encloses is turned outward. One that lies inside another keeps the turn the file gave it
 //!    relative to the outermost (a cavity stays a cavity), and becomes a cavity when the file gave it none.
-//! 5. Points that no face uses are dropped.
+//! 7. Points that no face uses are dropped.
 //!
-//! Nothing is added: holes stay holes and edges with three faces stay so; [`mod@super::check`] names them.
+//! No face is added: holes stay holes and edges with three faces stay so; [`mod@super::check`] names them.
 //! Cost `O(n log n)`, and `O(c)` winding numbers for each of `c` closed components.
 
+mod cut;
+mod walls;
+
 use crate::geometry::{Neighbours, TriangleMesh, WindingNumber, mesh::DisjointSets};
+use cut::cut_apart;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
+use walls::without_walls;
 
 /// What repair may do.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -46,7 +53,7 @@ pub const DROPPED: u32 = u32::MAX;
 pub struct Repaired {
     /// The mesh.
     pub mesh: TriangleMesh,
-    /// New point of every old one, or [`DROPPED`].
+    /// New point of every old one, or [`DROPPED`]; the first copy where there are several.
     pub point_map: Vec<u32>,
     /// New triangle of every old one, or [`DROPPED`].
     pub triangle_map: Vec<u32>,
@@ -67,6 +74,15 @@ pub struct RepairChanges {
     pub duplicate_triangles: usize,
     /// Faces turned round.
     pub turned_triangles: usize,
+    /// Faces dropped because they bound nothing: walls that divide a solid, small fins that hang on it.
+    #[serde(default)]
+    pub wall_triangles: usize,
+    /// Edges of four or more faces, where the surface touched itself, that were taken apart into edges of two.
+    #[serde(default)]
+    pub cut_edges: usize,
+    /// Other points in which the surface touched itself; they were doubled.
+    #[serde(default)]
+    pub cut_points: usize,
     /// Components that cannot be oriented (one-sided surfaces) and were left as they are.
     pub one_sided_components: usize,
 }
@@ -88,6 +104,18 @@ impl RepairChanges {
                 "triangles that lie on another one were dropped",
             ),
             (self.turned_triangles, "triangles were turned round"),
+            (
+                self.wall_triangles,
+                "triangles of walls and fins that bound nothing were dropped",
+            ),
+            (
+                self.cut_edges,
+                "edges in which the surface touches itself were taken apart",
+            ),
+            (
+                self.cut_points,
+                "points in which the surface touches itself were taken apart",
+            ),
             (self.unused_points, "points that no triangle uses were dropped"),
             (
                 self.one_sided_components,
@@ -110,28 +138,29 @@ pub fn repair(mesh: &TriangleMesh, settings: &RepairSettings) -> Repaired {
         .enumerate()
         .filter(|(i, w)| *i != **w as usize)
         .count();
-    let mut triangles: Vec<[u32; 3]> = Vec::with_capacity(mesh.triangles.len());
-    let mut triangle_map = vec![DROPPED; mesh.triangles.len()];
     let joined: Vec<[u32; 3]> = mesh
         .triangles
         .iter()
         .map(|t| t.map(|v| welded[v as usize]))
         .collect();
+    let mut triangle_map: Vec<u32> = (0..joined.len() as u32).collect();
     let kept = kept_triangles(&joined, &mut changes);
-    for (i, t) in joined.iter().enumerate() {
-        if kept[i] {
-            triangle_map[i] = triangles.len() as u32;
-            triangles.push(*t);
-        }
-    }
     let mut out = TriangleMesh {
         points: mesh.points.clone(),
-        triangles,
+        triangles: joined,
     };
+    keep_triangles(&mut out.triangles, &kept, &mut triangle_map);
     if settings.orient {
-        let given = out.triangles.clone();
-        orient(&mut out, &mut changes);
-        changes.turned_triangles = given.iter().zip(&out.triangles).filter(|(a, b)| a != b).count();
+        let mut turned = agree_patches(&mut out);
+        let kept = without_walls(&out);
+        changes.wall_triangles = kept.iter().filter(|k| !**k).count();
+        keep_triangles(&mut out.triangles, &kept, &mut triangle_map);
+        retain(&mut turned, &kept);
+        let cuts = cut_apart(&mut out);
+        (changes.cut_edges, changes.cut_points) = (cuts.edges, cuts.points);
+        turned.resize(out.triangles.len(), false);
+        let again = orient(&mut out, &turned, &mut changes);
+        changes.turned_triangles = turned.iter().zip(&again).filter(|(a, b)| a != b).count();
     }
     let point_map = drop_unused(&mut out, &welded, &mut changes);
     Repaired {
@@ -140,6 +169,27 @@ pub fn repair(mesh: &TriangleMesh, settings: &RepairSettings) -> Repaired {
         triangle_map,
         changes,
     }
+}
+
+/// Drops triangles, and says so in the map from those of the file.
+fn keep_triangles(triangles: &mut Vec<[u32; 3]>, kept: &[bool], map: &mut [u32]) {
+    let mut next = 0;
+    let slots: Vec<u32> = kept
+        .iter()
+        .map(|&k| {
+            next += u32::from(k);
+            if k { next - 1 } else { DROPPED }
+        })
+        .collect();
+    for slot in map.iter_mut().filter(|slot| **slot != DROPPED) {
+        *slot = slots[*slot as usize];
+    }
+    retain(triangles, kept);
+}
+
+fn retain<T>(items: &mut Vec<T>, kept: &[bool]) {
+    let mut each = kept.iter();
+    items.retain(|_| *each.next().expect("as many as items"));
 }
 
 /// Which triangles stay: those with three corners, and of those on the same corners what is left when opposite ones cancel.
@@ -219,8 +269,27 @@ fn drop_unused(mesh: &mut TriangleMesh, welded: &[u32], changes: &mut RepairChan
     welded.iter().map(|&w| slot[w as usize]).collect()
 }
 
-/// Turns faces to agree, then closed components outward.
-fn orient(mesh: &mut TriangleMesh, changes: &mut RepairChanges) {
+/// Turns the faces of each patch (bounded by rims and by edges of three and more faces) to agree; returns which were turned.
+fn agree_patches(mesh: &mut TriangleMesh) -> Vec<bool> {
+    let neighbours = across_edges(mesh);
+    let mut turned = vec![false; mesh.triangles.len()];
+    for part in &mesh.components() {
+        agree(part, &neighbours, &mut turned);
+    }
+    for (t, _) in mesh
+        .triangles
+        .iter_mut()
+        .zip(&turned)
+        .filter(|(_, turned)| **turned)
+    {
+        t.swap(1, 2);
+    }
+    turned
+}
+
+/// Turns faces to agree, then closed components outward; `before` says which faces were turned already. Returns which were turned
+/// now.
+fn orient(mesh: &mut TriangleMesh, before: &[bool], changes: &mut RepairChanges) -> Vec<bool> {
     let parts = mesh.components();
     let neighbours = across_edges(mesh);
     let mut turned = vec![false; mesh.triangles.len()];
@@ -241,7 +310,7 @@ fn orient(mesh: &mut TriangleMesh, changes: &mut RepairChanges) {
             shells.push(Shell {
                 triangles: part.clone(),
                 volume: piece.signed_volume(),
-                given: agreement == Agreement::AsGiven,
+                given: agreement == Agreement::AsGiven && !part.iter().any(|&t| before[t as usize]),
                 piece,
             });
         }
@@ -250,9 +319,11 @@ fn orient(mesh: &mut TriangleMesh, changes: &mut RepairChanges) {
         if flip {
             for &t in &shells[i].triangles {
                 mesh.triangles[t as usize].swap(1, 2);
+                turned[t as usize] ^= true;
             }
         }
     }
+    turned
 }
 
 /// A closed component whose faces agree.
@@ -446,6 +517,9 @@ mod tests {
             degenerate_triangles: 1,
             duplicate_triangles: 1,
             turned_triangles: 1,
+            wall_triangles: 0,
+            cut_edges: 0,
+            cut_points: 0,
             one_sided_components: 0,
         };
         assert_eq!(fixed.changes, expected);
@@ -473,6 +547,72 @@ mod tests {
         sheet.triangles = vec![[0, 1, 2], [1, 3, 2], [2, 1, 0], [3, 1, 2]];
         let fixed = repair(&sheet, &RepairSettings::default());
         assert_eq!(fixed.mesh.triangles, [[0, 1, 2], [1, 3, 2]]);
+    }
+
+    #[test]
+    fn solids_that_share_an_edge_are_taken_apart_and_turned_outward() {
+        // Two tetrahedra about the edge from 0 to 3, the second on the other side of it, and one of its faces turned.
+        let one = tetrahedron(1.0);
+        let mut both = one.clone();
+        both.points
+            .extend([DVec3::new(-5.0, -1.0, -1.0), DVec3::new(-1.0, -5.0, -1.0)]);
+        both.triangles
+            .extend(one.triangles.iter().map(|t| t.map(|i| [0, 4, 5, 3][i as usize])));
+        both.triangles[6].swap(0, 1);
+        assert_eq!(both.topology().nonmanifold_edges, 1);
+        let fixed = repair(&both, &RepairSettings::default());
+        assert_eq!(
+            fixed.changes,
+            RepairChanges {
+                cut_edges: 1,
+                turned_triangles: 1,
+                ..Default::default()
+            }
+        );
+        let t = fixed.mesh.topology();
+        assert!(t.watertight && t.oriented);
+        assert_eq!((t.components, t.nonmanifold_vertices), (2, 0));
+        let volume = 2.0 * one.signed_volume();
+        assert!((fixed.mesh.signed_volume() - volume).abs() < 1e-12);
+        assert_eq!(fixed.mesh.points.len(), both.points.len() + 2);
+        assert_eq!(fixed.point_map, [0, 1, 2, 3, 4, 5]);
+    }
+
+    #[test]
+    fn walls_and_small_fins_are_dropped_and_sheets_that_meet_stay() {
+        // Two tetrahedra on one face, the wall between them left in; a fin on an edge; both parts of a wider mesh.
+        let mut mesh = tetrahedron(1.0);
+        mesh.points.push(DVec3::splat(4.0));
+        mesh.triangles.extend([[1, 4, 3], [2, 4, 1], [3, 4, 2]]);
+        mesh.triangles.swap(0, 2);
+        let solid = {
+            let mut solid = mesh.clone();
+            solid.triangles.remove(0);
+            solid
+        };
+        assert!(solid.topology().watertight && solid.signed_volume() > 0.0);
+        let with_wall = repair(&mesh, &RepairSettings::default());
+        assert_eq!((&with_wall.mesh, with_wall.changes.wall_triangles), (&solid, 1));
+        assert_eq!(with_wall.triangle_map, [DROPPED, 0, 1, 2, 3, 4, 5]);
+        let mut with_fin = solid.clone();
+        with_fin.points.push(DVec3::new(-1.1, -1.1, -1.0));
+        with_fin.triangles.push([0, 3, 5]);
+        let fixed = repair(&with_fin, &RepairSettings::default());
+        assert_eq!((&fixed.mesh, fixed.changes.wall_triangles), (&solid, 1));
+        // Three pages on one back: no page is a fin.
+        let book = TriangleMesh {
+            points: [
+                [0., 0., 0.],
+                [0., 0., 1.],
+                [1., 0., 0.],
+                [0., 1., 0.],
+                [-1., -1., 0.],
+            ]
+            .map(DVec3::from_array)
+            .to_vec(),
+            triangles: vec![[0, 1, 2], [0, 1, 3], [0, 1, 4]],
+        };
+        assert_eq!(repair(&book, &RepairSettings::default()).mesh, book);
     }
 
     #[test]
