@@ -219,7 +219,10 @@ fn run(name: &str, truth: &TriangleMesh, noise: f64, seed: u64, options: &Option
             c.far_points,
             c.spikes,
             c.farthest_over_spacing,
-            c.narrow_handles.iter().map(|h| h.rings).collect::<Vec<_>>(),
+            c.narrow_handles
+                .iter()
+                .map(|h| (h.rings, h.place))
+                .collect::<Vec<_>>(),
             r.closing
                 .handles_removed
                 .iter()

@@ -7,26 +7,27 @@
 //! 2. Close ([`super::closure`]), whatever the cloud is: a closed surface shows by its unsupported area how open it is.
 //! 3. Decide: open when 1.5 % or more of the area has no points to support it, 3 % with strong noise (`judge`). An open surface is the
 //!    greedy one, oriented where that can be done ([`super::orient`]).
-//! 4. Second opinions: for strong noise a second and third thinning seed; the majority is returned.
+//! 4. Second opinions: for strong noise other thinning seeds and pulls; the run with the least to explain is taken ([`super::runs`]).
 //! 5. Doubt ([`super::self_check`]): the result looks for its own faults.
-//! 6. A doubted result is tried again with the smallest smoothing and with none, and the first without doubts is taken:
-//!    where parts are a few spacings thin or the sampling is patchy, detail reads as noise or outliers.
+//! 6. A doubted result is tried again with the smallest smoothing and, unless the noise is strong, with none, and the first
+//!    without doubts is taken: where parts are a few spacings thin or the sampling is patchy, detail reads as noise or outliers.
 //!
 //! Cost: `O(n log n)` in practice.
 
 use super::balls::Balls;
-use super::closure::{Closure, ClosureSettings, close, close_without_off, preset_facets};
+use super::closure::{Closure, preset_facets};
 use super::error::SegregationError;
 use super::gap_cost::CostRule;
 use super::gap_transforms::gap_transforms;
 use super::judge::{Judged, sorted};
-use super::labels::{Segregation, boundary_triangles};
+use super::labels::Segregation;
 use super::openness::{patches, rims};
 use super::orient::orient;
-use super::prepare::{Cleaned, Prepared, Strength, clean, thin_out};
-use super::report::{ClosingReport, CloudReport, ComponentReport, SecondOpinion, Variation};
+use super::prepare::{Strength, clean, thin_out};
+use super::report::{ClosingReport, CloudReport, ComponentReport, Variation};
+use super::runs::{Chosen, Run, choose, opinion_of, run};
 use super::self_check::{doubts, pull_opinions, self_check};
-use super::settings::{ClosedOrOpen, Denoise, SegregationSettings};
+use super::settings::{Denoise, SegregationSettings};
 use crate::delaunay::{Facet, Triangulation};
 use crate::geometry::{Neighbours, TriangleMesh, VertexId};
 use glam::DVec3;
@@ -80,7 +81,7 @@ pub fn segregate_cloud(
     if settings.denoise != Denoise::Auto || !first.report.doubtful() {
         return Ok(first);
     }
-    for &strength in gentler(&first.report) {
+    for &strength in gentler(&first.report, settings) {
         // Another strength may have fewer components than the one asked for; it is then no better.
         let Ok(mut other) = segregate_cleaned(points, strength, settings) else {
             continue;
@@ -102,8 +103,11 @@ pub fn segregate_cloud(
 }
 
 /// The strengths below what was done, strongest first.
-fn gentler(report: &CloudReport) -> &'static [Strength] {
+fn gentler(report: &CloudReport, settings: &SegregationSettings) -> &'static [Strength] {
     let done = &report.prepare;
+    if done.passes > 0 && done.noise_over_spacing >= settings.second_opinion_noise {
+        return &[Strength::Light];
+    }
     match (done.passes, done.outliers) {
         (0, 0) => &[],
         (0, _) => &[Strength::Nothing],
@@ -117,14 +121,7 @@ fn segregate_cleaned(
     settings: &SegregationSettings,
 ) -> Result<CloudSegregation, SegregationError> {
     let cleaned = clean(points, settings, strength);
-    let prepared = thin_out(&cleaned, settings.seed);
-    let closure = close_prepared(&prepared, &[], settings)?;
-    let first = Run {
-        prepared,
-        closure,
-        seed: settings.seed,
-    };
-    let chosen = with_second_opinions(first, &cleaned, settings)?;
+    let chosen = choose(&cleaned, settings)?;
     finish(points, chosen, &BTreeSet::new(), settings)
 }
 
@@ -148,25 +145,22 @@ pub(super) fn segregate_with_preset(
         place[old as usize] = new as u32;
     }
     let preset: Vec<[u32; 3]> = triangles.iter().map(|t| t.map(|i| place[i as usize])).collect();
-    let closure = close_prepared(&prepared, &preset, settings)?;
-    let known: BTreeSet<[u32; 3]> = preset_facets(&closure.triangulation, &preset)
+    let run = run(prepared, &preset, settings.seed, settings)?;
+    let triangulation = &run.closure.triangulation;
+    let known: BTreeSet<[u32; 3]> = preset_facets(triangulation, &preset)
         .into_iter()
-        .map(|f| sorted(closure.triangulation.facet_vertices(f)))
+        .map(|f| sorted(triangulation.facet_vertices(f)))
         .collect();
     let preset_facets = known
         .iter()
         .map(|t| {
-            let mut t = t.map(|v| prepared.source[v as usize]);
+            let mut t = t.map(|v| run.prepared.source[v as usize]);
             t.sort_unstable();
             t
         })
         .collect();
     let chosen = Chosen {
-        run: Run {
-            prepared,
-            closure,
-            seed: settings.seed,
-        },
+        run,
         opinions: Vec::new(),
     };
     Ok(PresetOutcome {
@@ -188,126 +182,6 @@ pub(super) fn check(points: &[DVec3]) -> Result<(), SegregationError> {
         }
         None => Ok(()),
     }
-}
-
-/// One prepared cloud and its closure.
-struct Run {
-    prepared: Prepared,
-    closure: Closure,
-    seed: u64,
-}
-
-struct Chosen {
-    run: Run,
-    opinions: Vec<SecondOpinion>,
-}
-
-fn close_prepared(
-    prepared: &Prepared,
-    preset: &[[u32; 3]],
-    settings: &SegregationSettings,
-) -> Result<Closure, SegregationError> {
-    let closing = ClosureSettings {
-        cost: settings.cost,
-        least_component_share: settings.least_component_share,
-        preset,
-    };
-    let share = settings.least_component_share;
-    let threshold = settings.threshold(&prepared.report);
-    let mut first = close(&prepared.points, &prepared.spacing_mm, &closing)?;
-    prefer_supported(&mut first, threshold, settings);
-    let judged = Judged::new(&first, &BTreeSet::new());
-    if settings.denoise == Denoise::Off || !judged.decide(threshold, settings).closed {
-        first.give_up_narrow_handles(share);
-        return Ok(first);
-    }
-    let mut second = close_without_off(first, &prepared.points, &prepared.spacing_mm, &closing)?;
-    prefer_supported(&mut second, threshold, settings);
-    second.give_up_narrow_handles(share);
-    Ok(second)
-}
-
-/// Takes the labels with less unsupported area when that halves it and the solid stays: noise can fill the gap between two
-/// thin parts, which then looks like a large hole that was closed.
-fn prefer_supported(closure: &mut Closure, threshold: f64, settings: &SegregationSettings) {
-    let now = Judged::new(closure, &BTreeSet::new());
-    if now.share < SUSPICIOUS * threshold || settings.closed == ClosedOrOpen::Open {
-        return;
-    }
-    let mut other = closure.clone();
-    other.replace_labels(closure.supported(settings.least_component_share));
-    let judged = Judged::new(&other, &BTreeSet::new());
-    let most_off = closure.triangulation.points.len() / 50;
-    let volume = |c: &Closure| closed_mesh(c).signed_volume();
-    if judged.share < 0.5 * now.share
-        && other.off <= closure.off.max(most_off)
-        && volume(&other) > 0.5 * volume(closure)
-    {
-        *closure = other;
-    }
-}
-
-/// Share of the threshold from which unsupported area is looked into.
-const SUSPICIOUS: f64 = 0.5;
-
-fn opinion(run: &Run) -> SecondOpinion {
-    opinion_of(&closed_mesh(&run.closure), Variation::Thinning { seed: run.seed })
-}
-
-fn opinion_of(mesh: &TriangleMesh, variation: Variation) -> SecondOpinion {
-    let t = mesh.topology();
-    SecondOpinion {
-        variation,
-        euler: t.euler,
-        components: t.components,
-    }
-}
-
-fn closed_mesh(closure: &Closure) -> TriangleMesh {
-    super::labels::mesh_of(
-        &closure.triangulation,
-        &boundary_triangles(&closure.triangulation, &closure.inside),
-    )
-}
-
-/// Step 4: for strong noise another seed, and a third when the two disagree; the majority wins, the first when there is none.
-fn with_second_opinions(
-    first: Run,
-    cleaned: &Cleaned,
-    settings: &SegregationSettings,
-) -> Result<Chosen, SegregationError> {
-    if !cleaned.is_random() || cleaned.noise_over_spacing() < settings.second_opinion_noise {
-        return Ok(Chosen {
-            run: first,
-            opinions: Vec::new(),
-        });
-    }
-    let mut runs = vec![first];
-    let mut opinions = vec![opinion(&runs[0])];
-    let same = |a: &SecondOpinion, b: &SecondOpinion| (a.euler, a.components) == (b.euler, b.components);
-    for k in 1..3u64 {
-        let seed = settings.seed.wrapping_add(k);
-        let prepared = thin_out(cleaned, seed);
-        let closure = close_prepared(&prepared, &[], settings)?;
-        runs.push(Run {
-            prepared,
-            closure,
-            seed,
-        });
-        opinions.push(opinion(&runs[k as usize]));
-        if k == 1 && same(&opinions[0], &opinions[1]) {
-            break;
-        }
-    }
-    let votes = |i: usize| opinions.iter().filter(|o| same(o, &opinions[i])).count();
-    let best = (0..runs.len())
-        .rev()
-        .max_by_key(|&i| votes(i))
-        .expect("there is a first run");
-    Ok(Chosen {
-        run: runs.swap_remove(best),
-        opinions,
-    })
 }
 
 /// Decision, report and maps.
@@ -353,7 +227,11 @@ fn finish(
             &prepared.points,
             &prepared.spacing_mm,
         );
-        if report.self_check.thin_share > 0.0 && report.self_check.narrow_handles.is_empty() {
+        let tried = report
+            .second_opinions
+            .iter()
+            .any(|o| matches!(o.variation, Variation::Pull { .. }));
+        if report.self_check.thin_share > 0.0 && report.self_check.narrow_handles.is_empty() && !tried {
             let more = pull_opinions(&closure, settings.least_component_share);
             if report.second_opinions.is_empty() {
                 report.second_opinions.push(opinion_of(&mesh, Variation::None));
@@ -560,7 +438,7 @@ fn pick_component(
                 .filter(|t| segregation.inside[t.index()] && !keep[t.index()]),
         );
     }
-    segregation.triangles = boundary_triangles(triangulation, &keep);
+    segregation.triangles = super::labels::boundary_triangles(triangulation, &keep);
     segregation.inside = keep;
     Ok(())
 }

@@ -212,27 +212,39 @@ impl LabellingProblem<'_> {
             .finite_tets()
             .filter(|&t| self.triangulation.tet(t).iter().all(|v| near[v.index()]))
             .collect();
+        let biased = |bias: f32, filled: bool| {
+            let mut biased = pull.to_vec();
+            for t in &round {
+                biased[t.index()] += if filled { bias } else { -bias };
+            }
+            let labelled = self.cut(&biased);
+            let state = self.state(&labelled);
+            (biased, labelled, state)
+        };
+        // What the strongest bias cannot do no weaker one can.
+        let strongest = BIASES[BIASES.len() - 1];
+        let mut ways = [true, false].map(|filled| {
+            *cuts += 1;
+            let open = biased(strongest, filled).2.genus() < now.genus();
+            Way { filled, open }
+        });
+        // The energy grows with the bias: a way that is too dear at one step is too dear at all later ones.
         for bias in BIASES {
             let mut best: Option<Attempt> = None;
-            for filled in [true, false] {
+            for way in ways.iter_mut().filter(|w| w.open) {
                 *cuts += 1;
-                let mut biased = pull.to_vec();
-                for t in &round {
-                    biased[t.index()] += if filled { bias } else { -bias };
+                let (pull, labelled, mut state) = biased(bias, way.filled);
+                if state.genus() >= now.genus() || state.topology.components != now.topology.components {
+                    continue;
                 }
-                let labelled = self.cut(&biased);
-                let mut state = self.state(&labelled);
                 state.energy = self.energy(&labelled.inside);
-                if state.genus() < now.genus()
-                    && state.topology.components == now.topology.components
-                    && state.energy - now.energy <= MOST_ENERGY / f64::from(handle.rings)
-                    && best.as_ref().is_none_or(|b| state.energy < b.state.energy)
-                {
+                way.open = state.energy - now.energy <= MOST_ENERGY / f64::from(handle.rings);
+                if way.open && best.as_ref().is_none_or(|b| state.energy < b.state.energy) {
                     best = Some(Attempt {
                         labelled,
-                        pull: biased,
+                        pull,
                         state,
-                        filled,
+                        filled: way.filled,
                     });
                 }
             }
@@ -242,6 +254,13 @@ impl LabellingProblem<'_> {
         }
         None
     }
+}
+
+/// Filling a tunnel or breaking a bridge.
+struct Way {
+    filled: bool,
+    /// Whether it may still be taken.
+    open: bool,
 }
 
 /// A labelling's surface.

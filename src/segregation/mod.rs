@@ -7,7 +7,7 @@
 //!   generators where that does not give the surface's topology.
 //! * [`cloud`]: a raw cloud is prepared ([`prepare`]: outliers, noise), shows its surface by greedy gap transforms
 //!   ([`gap_transforms`] at the price of [`gap_cost`]), is closed ([`closure`]: [`diffusion`], [`labelling`] with [`min_cut`], [`islands`],
-//!   [`star_repair`], [`adopt`], [`handles`]), judged open or closed (`judge`, [`openness`]), oriented ([`orient`]), reported
+//!   [`star_repair`], [`adopt`], [`handles`]), judged open or closed (`judge`, [`openness`]), tried otherwise where noise is strong (`runs`), oriented ([`orient`]), reported
 //!   ([`report`]) and looked over for faults ([`self_check`]).
 //! * [`mesh_repair`]: a damaged mesh keeps its good triangles; the rest is found anew from its points. [`mend()`] closes holes.
 
@@ -36,6 +36,7 @@ pub mod orient;
 pub mod prepare;
 pub mod refine;
 pub mod report;
+mod runs;
 pub mod self_check;
 pub mod settings;
 pub mod star_repair;

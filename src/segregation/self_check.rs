@@ -6,7 +6,8 @@
 //! 1. *Unsupported area*: triangles whose edges are longer than four spacings.
 //! 2. *Parts cut off*: points that the closing left out, and their distance to the surface.
 //! 3. *Spikes*: points all of whose triangles are unsupported, as an outlier on the surface has.
-//! 4. *Narrow handles* ([`super::handles`]) that could not be given up: a bridge or tunnel a few points round.
+//! 4. *Narrow handles* ([`super::handles`]) that could not be given up: a bridge or tunnel a few points round, the narrower
+//!    the weaker the noise.
 //! 5. *Other runs* must agree on the Euler number and the components: other thinning seeds when the noise is strong; where
 //!    two sheets lie back to back within two spacings, also the minimum cut with a weaker and a stronger pull.
 //! 6. An *open* surface: rims of a few edges are holes that nobody cut, many rims and handles are more likely noise or
@@ -27,7 +28,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Factors on the pull of the other labellings.
-const PULL_FACTORS: [f32; 2] = [0.5, 2.0];
+pub(super) const PULL_FACTORS: [f32; 2] = [0.5, 2.0];
 /// Normals of two sheets back to back make at least this angle (cosine), and the edge between them with each.
 const OPPOSITE: f64 = -0.5;
 const ALONG: f64 = 0.6;
@@ -101,11 +102,14 @@ pub struct Doubt {
 }
 
 /// Share of points off the surface above which a result is doubtful.
-const DOUBTFUL_OFF: f64 = 0.01;
+pub(super) const DOUBTFUL_OFF: f64 = 0.01;
 /// Unsupported share above which a closed result is doubtful, as a share of the threshold; its inverse for open ones.
 const NEAR_THRESHOLD: f64 = 0.5;
 /// Far points from which a part may be cut off.
 const FAR_POINTS: usize = 5;
+/// Noise over spacing from which also the widest of the narrow handles are doubted: a loop of nine edges is three spacings across,
+/// two sheets of this noise as much. Below it tubes this thin come out right.
+const BLURRED: f64 = 0.7;
 /// Rims of at most this many edges are not meant.
 const SHORT_RIM: usize = 8;
 /// Rims and twice the handles of an open surface (twice its components less its Euler number) beyond which it is doubted;
@@ -223,16 +227,23 @@ pub(super) fn doubts(report: &CloudReport, settings: &SegregationSettings) -> Ve
             ),
         );
     }
-    if let Some(first) = check.narrow_handles.first() {
+    let blurred = report.prepare.noise_over_spacing >= BLURRED;
+    let widest = super::handles::LONGEST_LOOP / 2 - u32::from(!blurred);
+    let narrow: Vec<&NarrowHandle> = check
+        .narrow_handles
+        .iter()
+        .filter(|h| h.rings <= widest)
+        .collect();
+    if let Some(first) = narrow.first() {
         doubt(
             DoubtKind::NarrowHandles,
-            check.narrow_handles.len() as f64,
+            narrow.len() as f64,
             0.0,
             Some(first.place),
             format!(
                 "bridges or tunnels at most {} edges round at {} places: the points cannot show whether they are real",
-                super::handles::LONGEST_LOOP,
-                check.narrow_handles.len()
+                2 * widest + 1,
+                narrow.len()
             ),
         );
     }

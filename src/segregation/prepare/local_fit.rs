@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, SymmetricEigen};
 use rayon::prelude::*;
 
 /// Terms of a quadratic in two variables.
-const TERMS: usize = 6;
+pub const TERMS: usize = 6;
 
 /// A quadratic height field over the tangent plane of a point.
 #[derive(Clone, Copy, Debug)]

@@ -5,7 +5,8 @@
 //!
 //! 1. Duplicates are merged and outliers dropped ([`outliers`]).
 //! 2. The noise level is measured against the spacing ([`noise`]).
-//! 3. Moving-least-squares passes, as many as the level asks for ([`smooth`]); none below 3 % of the spacing.
+//! 3. Moving-least-squares passes, as many as the level asks for ([`smooth`]); none below 3 % of the spacing. Every point has
+//!    as many neighbours as the noise alone explains, fewer where the surface bends or another sheet is near.
 //! 4. After any pass the cloud is thinned to a fraction of the spacing ([`thin`]), because two points closer than what is
 //!    left of the noise only make slivers.
 //!
@@ -127,7 +128,7 @@ pub fn clean(points: &[DVec3], settings: &SegregationSettings, strength: Strengt
         report.outliers = source.len() - keep.len();
         source = keep.iter().map(|&i| source[i as usize]).collect();
     }
-    let level = noise::estimate(&points, &mut lists);
+    let level = noise::estimate(&points, &lists);
     report.noise_over_spacing = level.noise_over_spacing;
     report.spacing_mm = level.spacing_mm;
     let mut moves = vec![0.0; points.len()];

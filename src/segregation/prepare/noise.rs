@@ -4,12 +4,14 @@
 //!
 //! 1. At every point fit a quadratic height field to its `k` nearest; `sigma_k` is the rms residual over `k - 6` degrees of
 //!    freedom, divided by the local spacing. The median over all points is `r_k`.
-//! 2. Curvature and sharp edges bias `r_k` upward. The bias of a quadratic fit grows like the cube of its width, that is
-//!    `k^(3/2)`, so its square grows like `k^3`, and two sizes remove it (Richardson extrapolation):
+//! 2. With strong noise the fit turns with the points and reads too little, the more the fewer they are; a table made on a
+//!    plane ([`TRUTH`]) takes that back.
+//! 3. Curvature, sharp edges and second sheets bias `r_k` upward. The bias of a quadratic fit grows like the cube of its
+//!    width, that is `k^(3/2)`, so its square grows like `k^3`, and two sizes remove it (Richardson extrapolation):
 //!    `r^2 = (r16^2 - (16/24)^3 r24^2) / (1 - (16/24)^3)`.
-//! 3. Above `r16 = 0.35` sixteen neighbours no longer hold a surface; `r32` is used.
 //!
-//! Measured over 9 shapes: 0 reads at most 0.027, 0.05 at least 0.050, 0.25 reads 0.248-0.275.
+//! Measured over 9 shapes: 0 reads at most 0.027, 0.05 at least 0.050, 0.25 reads 0.248-0.305; 0.5 reads at most 0.62 where
+//! parts are three to five spacings thick, which 32 neighbours alone read as 0.64-0.78.
 
 use super::knn::KnnLists;
 use super::local_fit::plain_fit;
@@ -21,10 +23,10 @@ use serde::{Deserialize, Serialize};
 pub const SMALL: usize = 16;
 /// Neighbours of the larger fit.
 pub const LARGE: usize = 24;
-/// Neighbours when the noise is strong.
-const STRONG: usize = 32;
-/// `r16` above which the small fit saturates.
-const SATURATION: f64 = 0.35;
+/// Noise over spacing of a plane, and what the two sizes read there (20 000 points).
+const TRUTH: [f64; 9] = [0.0, 0.2, 0.35, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0];
+const READ_SMALL: [f64; 9] = [0.0, 0.200, 0.343, 0.469, 0.542, 0.597, 0.639, 0.672, 0.696];
+const READ_LARGE: [f64; 9] = [0.0, 0.200, 0.347, 0.485, 0.569, 0.643, 0.706, 0.757, 0.800];
 /// Noise over spacing below which nothing is done: between the readings of 0 (at most 0.027) and 0.05 (at least 0.050).
 pub const THRESHOLD: f64 = 0.03;
 
@@ -80,23 +82,27 @@ pub fn plan(noise_over_spacing: f64) -> Option<SmoothingPlan> {
     }
 }
 
-/// Measures the level. `lists` is widened when the noise asks for it.
-pub fn estimate(points: &[DVec3], lists: &mut KnnLists) -> NoiseLevel {
+/// Measures the level; the lists hold at least [`LARGE`] neighbours where there are as many points.
+pub fn estimate(points: &[DVec3], lists: &KnnLists) -> NoiseLevel {
     let small = residuals(points, lists, SMALL);
     let large = residuals(points, lists, LARGE);
-    let (r16, r24) = (median_ratio(&small), median_ratio(&large));
-    let spacing_mm = median(small.iter().map(|r| r.spacing_mm).collect());
-    let noise_over_spacing = if r16 > SATURATION {
-        *lists = KnnLists::new(points, 48);
-        median_ratio(&residuals(points, lists, STRONG))
-    } else {
-        let share = (SMALL as f64 / LARGE as f64).powi(3);
-        ((r16 * r16 - share * r24 * r24) / (1.0 - share)).max(0.0).sqrt()
-    };
+    let narrow = unsaturated(median_ratio(&small), &READ_SMALL);
+    let wide = unsaturated(median_ratio(&large), &READ_LARGE);
+    let share = (SMALL as f64 / LARGE as f64).powi(3);
     NoiseLevel {
-        noise_over_spacing,
-        spacing_mm,
+        noise_over_spacing: ((narrow * narrow - share * wide * wide) / (1.0 - share))
+            .max(0.0)
+            .sqrt(),
+        spacing_mm: median(small.iter().map(|r| r.spacing_mm).collect()),
     }
+}
+
+/// The noise that reads as this on a plane: the table between and beyond its entries.
+fn unsaturated(reading: f64, table: &[f64; TRUTH.len()]) -> f64 {
+    let above = table.partition_point(|t| *t < reading).clamp(1, TRUTH.len() - 1);
+    let (low, high) = (table[above - 1], table[above]);
+    let share = (reading - low) / (high - low);
+    TRUTH[above - 1] + share * (TRUTH[above] - TRUTH[above - 1])
 }
 
 /// Residual of one fit and the spacing it is measured in, mm.
@@ -112,6 +118,11 @@ fn residuals(points: &[DVec3], lists: &KnnLists, k: usize) -> Vec<Residual> {
         .map(|i| residual(points, lists.first(i, k), points[i]))
         .collect();
     all.into_iter().flatten().collect()
+}
+
+/// Residual of one fit over the spacing of its neighbours.
+pub(super) fn noise_ratio(points: &[DVec3], list: &[u32], origin: DVec3) -> Option<f64> {
+    residual(points, list, origin).map(|r| r.sigma_mm / r.spacing_mm)
 }
 
 fn residual(points: &[DVec3], list: &[u32], origin: DVec3) -> Option<Residual> {

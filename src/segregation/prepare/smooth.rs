@@ -2,6 +2,11 @@
 //!
 //! In: points, lists, a plan. Out: the points moved, lists of the moved points.
 //!
+//! First every point is given its kernel: the neighbours of the plan when a quadratic fit to them leaves no more than the noise,
+//! else the next fewer. Where a part is thin or an edge sharp many neighbours lie on another side of it; a kernel chosen by the
+//! noise alone joins the two sides (Lepskii's rule: as wide as the bias does not show). Measured on 3 000 points with noise of
+//! half the spacing: bunny 7 of 7 right instead of 2, whose ears are one to three spacings thick.
+//!
 //! One pass, at every point: weights `exp(-d^2 / (0.4 R^2))` with `R` the distance of the farthest neighbour; weighted
 //! principal frame; a first quadratic height fit whose weights also fall with the height over the point, then two
 //! re-weightings by the residual, `w / (1 + (res / 2.5 sigma)^2)^2`; the move is at most `R`. After Levin 1998 and Alexa et
@@ -12,13 +17,17 @@
 //! a quarter spacing: largest error 0.6 instead of 1.0 spacings, and 8 of 8 instead of 1 of 6 clouds right.
 
 use super::knn::KnnLists;
-use super::local_fit::{MOST, fit_heights, principal_frame};
-use super::noise::SmoothingPlan;
+use super::local_fit::{MOST, TERMS, fit_heights, principal_frame};
+use super::noise::{SmoothingPlan, noise_ratio};
 use glam::DVec3;
 use rayon::prelude::*;
 
 /// Width of the weights over the squared distance of the farthest neighbour.
 const WIDTH: f64 = 0.4;
+/// Smaller numbers of neighbours to fall back on.
+const KERNELS: [usize; 3] = [32, 24, 18];
+/// Standard deviations by which the variance of the residuals may exceed that of the noise.
+const EXCESS: f64 = 2.0;
 /// Re-weighting steps.
 const REWEIGHTINGS: usize = 2;
 /// Heights and residuals are compared with this many standard deviations of the measured noise.
@@ -28,6 +37,13 @@ const LEAST_WEIGHT: f64 = 1e-6;
 
 /// Makes the passes of the plan; `lists` are those of the moved points afterwards.
 pub fn smooth(points: &mut Vec<DVec3>, lists: &mut KnnLists, plan: &SmoothingPlan) {
+    if lists.k() < plan.neighbours {
+        *lists = KnnLists::new(points, plan.neighbours);
+    }
+    let kernels: Vec<usize> = (0..points.len())
+        .into_par_iter()
+        .map(|i| kernel(points, lists, i, plan))
+        .collect();
     for pass in 0..plan.passes {
         if pass > 0 || lists.k() < plan.neighbours {
             *lists = KnnLists::new(points, plan.neighbours);
@@ -37,7 +53,7 @@ pub fn smooth(points: &mut Vec<DVec3>, lists: &mut KnnLists, plan: &SmoothingPla
             .map(|i| {
                 project(
                     points,
-                    lists.first(i, plan.neighbours),
+                    lists.first(i, kernels[i]),
                     points[i],
                     plan.noise_over_spacing,
                 )
@@ -47,6 +63,22 @@ pub fn smooth(points: &mut Vec<DVec3>, lists: &mut KnnLists, plan: &SmoothingPla
         *points = moved;
     }
     *lists = KnnLists::new(points, super::noise::LARGE);
+}
+
+/// The most neighbours whose residuals the noise explains: those of the plan or one of [`KERNELS`].
+fn kernel(points: &[DVec3], lists: &KnnLists, i: usize, plan: &SmoothingPlan) -> usize {
+    let mut size = plan.neighbours;
+    for smaller in KERNELS.into_iter().filter(|&k| k < plan.neighbours) {
+        let Some(ratio) = noise_ratio(points, lists.first(i, size), points[i]) else {
+            return size;
+        };
+        let scatter = (2.0 / (size - TERMS) as f64).sqrt();
+        if ratio * ratio <= plan.noise_over_spacing.powi(2) * (1.0 + EXCESS * scatter) {
+            return size;
+        }
+        size = smaller;
+    }
+    size
 }
 
 /// Where one point goes; `None` when its neighbours determine no surface.
