@@ -13,7 +13,6 @@
 //! pages (slow to be had on virtual machines), nor curves cut into slabs of x (the insertion loses more), nor counting in
 //! vector registers (buckets are too small) made it faster.
 
-use super::counters::Counters;
 use super::insertion::INF;
 use super::triangulation::Triangulation;
 use crate::geometry::VertexId;
@@ -42,6 +41,9 @@ const DEAD: u8 = 0;
 
 /// Buckets up to this size are ordered by counting smaller elements, which needs no branches.
 const SMALL: usize = 24;
+
+/// Threads that count for themselves.
+const MOST_COUNTS: usize = 8;
 
 /// Tetrahedra renamed by one task at a time.
 const CHUNK: usize = 1 << 14;
@@ -115,20 +117,25 @@ pub(super) fn canonical(
     }
 }
 
-/// An empty vector for `len` elements, with room for at least 48 MiB when that is not little: allocators hand such blocks out
+/// Elements to make room for when `len` are needed: at least 48 MiB when that is not little. Allocators hand such blocks out
 /// page by page as they are touched and give them back to the system at once, where smaller ones stay with the process.
-pub(super) fn room<T>(len: usize) -> Vec<T> {
+fn capacity<T>(len: usize) -> usize {
     if len < 1 << 16 {
-        Vec::with_capacity(len)
+        len
     } else {
-        Vec::with_capacity(len.max((48 << 20) / size_of::<T>()))
+        len.max((48 << 20) / size_of::<T>())
     }
 }
 
-/// `len` zeros in such a block.
+/// An empty vector in such a block.
+pub(super) fn room<T>(len: usize) -> Vec<T> {
+    Vec::with_capacity(capacity::<T>(len))
+}
+
+/// `len` zeros in such a block, not touched yet.
 pub(super) fn zeros<T: Clone + Default>(len: usize) -> Vec<T> {
-    let mut v = room(len);
-    v.resize(len, T::default());
+    let mut v = vec![T::default(); capacity::<T>(len)];
+    v.truncate(len);
     v
 }
 
@@ -145,33 +152,45 @@ struct Renamed {
     ghosts: Vec<u32>,
 }
 
-/// Step 1 for all tetrahedra.
+/// Step 1 for all tetrahedra. Every thread counts for itself, as long as the counts of all find room beside what is there.
 fn rename(vertices: &mut [[u32; 4]], order: Vec<u32>) -> Renamed {
     let mut places: Vec<u8> = zeros(vertices.len());
-    let mut counters = Counters::new(order.len());
-    let ghosts: Vec<Vec<u32>> = (vertices.par_chunks_mut(CHUNK), places.par_chunks_mut(CHUNK))
+    let threads = rayon::current_num_threads().min(MOST_COUNTS);
+    let part = vertices.len().div_ceil(threads).max(CHUNK);
+    let mut counts: Vec<(Vec<u32>, Vec<u32>)> = (vertices.par_chunks_mut(part), places.par_chunks_mut(part))
         .into_par_iter()
         .enumerate()
-        .map(|(chunk, (tets, places))| {
+        .map(|(i, (tets, places))| {
+            let mut counts: Vec<u32> = zeros(order.len());
             let mut ghosts = Vec::new();
-            let first = (chunk * CHUNK) as u32;
+            let first = (i * part) as u32;
             for ((v, places), slot) in tets.iter_mut().zip(places).zip(first..) {
                 (*v, *places) = renamed(*v, &order);
                 if v[3] != INF {
-                    counters.add(v[0] as usize, 1);
+                    counts[v[0] as usize] += 1;
                 } else if v[0] != INF {
                     ghosts.push(slot);
                 }
             }
-            ghosts
+            (counts, ghosts)
         })
         .collect();
-    let finite = counters.accumulate() as usize;
+    let ghosts = counts.iter().flat_map(|(_, ghosts)| ghosts).copied().collect();
+    let (mut ends, _) = counts.swap_remove(0);
+    for (more, _) in &counts {
+        (ends.par_chunks_mut(CHUNK), more.par_chunks(CHUNK))
+            .into_par_iter()
+            .for_each(|(ends, more)| ends.iter_mut().zip(more).for_each(|(e, m)| *e += m));
+    }
+    let mut finite = 0;
+    for end in &mut ends {
+        (*end, finite) = (finite, finite + *end);
+    }
     Renamed {
         places,
-        ends: counters.into_inner(),
-        finite,
-        ghosts: ghosts.concat(),
+        ends,
+        finite: finite as usize,
+        ghosts,
     }
 }
 

@@ -6,7 +6,7 @@
 //! that the range of exponents can be handled exactly. Cost: `O(n log n)`, `O(n)` when the points come sorted.
 
 use super::canonical::room;
-use super::order::radix_sort;
+use super::sort::{DIGIT, radix_sort};
 use crate::geometry::predicates::lexicographic;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -227,7 +227,9 @@ pub(super) fn distinct(points: &[DVec3]) -> Result<Vec<DVec3>, DelaunayError> {
     // Adding zero turns -0.0 into 0.0 and leaves every other number as it is.
     let mut out: Vec<DVec3> = Vec::with_capacity(points.len());
     out.par_extend(lexicographic_order(points).map(|i| points[i as usize] + DVec3::ZERO));
-    out.dedup();
+    if out.par_windows(2).any(|w| w[0] == w[1]) {
+        out.dedup();
+    }
     Ok(out)
 }
 
@@ -236,8 +238,9 @@ pub(super) fn distinct(points: &[DVec3]) -> Result<Vec<DVec3>, DelaunayError> {
 fn lexicographic_order(points: &[DVec3]) -> impl IndexedParallelIterator<Item = u32> {
     let index_bits = usize::BITS - points.len().leading_zeros();
     let cells = ((1u64 << (u64::BITS - index_bits)) - 1) as f64 * 0.5;
-    let lo = points.iter().fold(f64::INFINITY, |m, p| m.min(p.x));
-    let hi = points.iter().fold(f64::NEG_INFINITY, |m, p| m.max(p.x));
+    let xs = || points.par_iter().with_min_len(1 << 14).map(|p| p.x);
+    let lo = xs().reduce(|| f64::INFINITY, f64::min);
+    let hi = xs().reduce(|| f64::NEG_INFINITY, f64::max);
     let factor = cells / (hi - lo);
     // Rounding is monotonic. Ranges beyond f64 make all keys equal or extreme, which is correct as well.
     let key = |x: f64| (((x - lo) * factor).min(cells) as u64) << index_bits;
@@ -248,22 +251,24 @@ fn lexicographic_order(points: &[DVec3]) -> impl IndexedParallelIterator<Item = 
             .zip(0..points.len() as u32)
             .map(|(p, i)| key(p.x) | u64::from(i)),
     );
-    radix_sort(&mut keys, index_bits);
+    // Three digits tell nearly all points apart; the others are compared anyway.
+    let low = index_bits.max(u64::BITS - 3 * DIGIT);
+    radix_sort(&mut keys, low);
     let index = move |k: u64| (k & ((1 << index_bits) - 1)) as u32;
-    for run in keys.chunk_by_mut(|a, b| a >> index_bits == b >> index_bits) {
-        if run.len() > 1 {
+    keys.par_chunk_by_mut(|a, b| a >> low == b >> low)
+        .filter(|run| run.len() > 1)
+        .for_each(|run| {
             run.par_sort_unstable_by(|&a, &b| {
                 let [p, q] = [a, b].map(|k| points[index(k) as usize]);
-                lexicographic(p, q).then(a.cmp(&b))
+                lexicographic(p, q).then_with(|| index(a).cmp(&index(b)))
             });
-        }
-    }
+        });
     keys.into_par_iter().map(index)
 }
 
 /// Strictly increasing, so distinct too.
 fn is_sorted(points: &[DVec3]) -> bool {
-    points.windows(2).all(|w| lexicographic(w[0], w[1]).is_lt())
+    points.par_windows(2).all(|w| lexicographic(w[0], w[1]).is_lt())
 }
 
 fn check(points: &[DVec3]) -> Result<(), DelaunayError> {

@@ -187,7 +187,7 @@ impl<L: Lanes> Inserter<'_, L> {
         }
         if S::SHARED {
             self.memory.last = tet;
-            if !store.owns(self.sites, v) || !self.in_conflict(store, v, tet, p) {
+            if !store.owns(tet) || !self.in_conflict(store, v, tet, p) {
                 return None;
             }
         }
@@ -269,8 +269,8 @@ impl<L: Lanes> Inserter<'_, L> {
                 let mut first = 0;
                 for k in 0..4 {
                     let other = n[k] >> 2;
-                    // Before anything is noted: several threads may look at what none of them owns.
-                    if S::SHARED && !store.owns(self.sites, store.tet(other)) {
+                    // Before anything is noted: it may be another's.
+                    if S::SHARED && !store.owns(other) {
                         denied = true;
                         visited += first;
                         break 'layer;

@@ -14,12 +14,12 @@ use glam::DVec3;
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(32))]
 pub(crate) struct Site {
-    /// x, y, z and the position on the curve, which only several threads look at.
+    /// x, y, z and the position along the longest side of the box, which only several threads look at.
     pub lanes: [f64; 4],
 }
 
 impl Site {
-    /// The point, at a position of the curve.
+    /// The point, at a position along the longest side of the box.
     pub(crate) fn new(p: DVec3, position: f64) -> Self {
         Self {
             lanes: [p.x, p.y, p.z, position],
@@ -33,7 +33,7 @@ impl Site {
         DVec3::new(x, y, z)
     }
 
-    /// Where the point is on the curve.
+    /// Where the point is along the longest side of the box.
     #[inline(always)]
     pub(crate) fn position(&self) -> f64 {
         self.lanes[3]

@@ -4,8 +4,8 @@
 //! alone: cospherical ties are broken by coordinates, tetrahedra are numbered canonically, so no order of insertion and no
 //! thread count can be seen in the result.
 //!
-//! Steps, one file each: [`door`] checks, sorts and merges the points; `order` arranges them in randomised rounds along a
-//! Hilbert curve; `insertion` and `star` add them one by one into a `store`, with `parallel` by several threads, by the exact
+//! Steps, one file each: [`door`] checks, sorts (`sort`) and merges the points; `order` arranges them in randomised rounds along
+//! a Hilbert curve; `insertion` and `star` add them one by one into a `store`, with `parallel` by several threads, by the exact
 //! tests of `filter`, whose arithmetic is in `lanes`; `canonical` renumbers. Points that do not span space are no error:
 //! [`Triangulation::dimension`] says so and there are no tetrahedra.
 
@@ -17,6 +17,7 @@ mod insertion;
 pub(crate) mod lanes;
 mod order;
 mod parallel;
+mod sort;
 mod star;
 mod store;
 pub mod triangulation;
@@ -24,6 +25,7 @@ pub mod triangulation;
 pub use door::{DelaunayError, Generators, prepare};
 pub use triangulation::{Facet, INFINITE, Triangulation};
 
+use crate::geometry::mesh;
 use crate::geometry::predicates::{collinear, orient3d};
 use door::Frame;
 use filter::Filter;
@@ -63,24 +65,22 @@ pub struct DelaunaySettings {
 pub fn delaunay(points: &[DVec3], settings: &DelaunaySettings) -> Result<Triangulation, DelaunayError> {
     let points = door::distinct(points)?;
     let frame = Frame::of(&points)?;
-    let bounds = crate::geometry::mesh::bounds(&points)
-        .unwrap_or_default()
-        .map(|p| frame.apply(p));
+    let bounds = bounds(&points).map(|p| frame.apply(p));
     let normalised: Cow<[DVec3]> = if frame.exponent == 0 {
         Cow::Borrowed(&points)
     } else {
         points.iter().map(|&p| frame.apply(p)).collect()
     };
     let order = order::insertion_order(&normalised, bounds);
+    let longest = (bounds[1] - bounds[0]).max_position();
     // In memory that goes back to the system before the renumbering.
     let mut sites = canonical::room(normalised.len());
     let mut indices = canonical::room(normalised.len());
-    sites.par_extend(
-        order
-            .par_iter()
-            .map(|(i, position)| Site::new(normalised[i as usize], position)),
-    );
-    indices.par_extend(order.par_iter().map(|(i, _)| i));
+    sites.par_extend(order.par_iter().map(|i| {
+        let p = normalised[i as usize];
+        Site::new(p, p[longest])
+    }));
+    indices.par_extend(order.par_iter());
     let ends = order.ends;
     drop(normalised);
     let first = match first_simplex(&sites) {
@@ -96,7 +96,8 @@ pub fn delaunay(points: &[DVec3], settings: &DelaunaySettings) -> Result<Triangu
     let threads = match settings.threads {
         0 => rayon::current_num_threads(),
         n => n,
-    };
+    }
+    .min(parallel::MOST_THREADS);
     let store = insert_all(&sites, Filter::new(bounds), &ends, first, threads);
     drop(sites);
     Ok(canonical::canonical(
@@ -107,8 +108,16 @@ pub fn delaunay(points: &[DVec3], settings: &DelaunaySettings) -> Result<Triangu
     ))
 }
 
-/// Points that one thread inserts before others join: until then they would be in each other's way.
-const ALONE: u32 = 8192;
+/// The box of points.
+fn bounds(points: &[DVec3]) -> [DVec3; 2] {
+    let parts = points.par_chunks(1 << 14).filter_map(mesh::bounds);
+    parts
+        .reduce_with(|[a, b], [lo, hi]| [a.min(lo), b.max(hi)])
+        .unwrap_or_default()
+}
+
+/// Rounds that end before this many points are left to one thread: in these, threads would be in each other's way.
+const ALONE: u32 = 16384;
 
 /// Slots a point: surfaces and uniform clouds need less than seven, torus-like ones a little more. More is not wrong, the
 /// store grows; it is untouched memory.
@@ -129,12 +138,17 @@ fn insert_all(sites: &[Site], filter: Filter, ends: &[u32], first: [u32; 4], thr
         });
     };
     let mut others = |v: &u32| !first.contains(v);
-    if threads == 1 || n < 2 * ALONE {
+    if threads == 1 || n < ALONE {
         alone(&mut store, &mut (0..n).filter(&mut others));
         return store;
     }
     // The four points of the first tetrahedron are among the first unless the cloud is nearly flat.
-    let begin = first.into_iter().max().map_or(0, |v| v + 1).max(ALONE);
+    let first_rounds = ends.iter().copied().take_while(|&end| end < ALONE);
+    let begin = first
+        .into_iter()
+        .map(|v| v + 1)
+        .chain(first_rounds)
+        .fold(0, u32::max);
     alone(&mut store, &mut (0..begin).filter(&mut others));
     let mut from = begin;
     let mut rounds = Vec::new();

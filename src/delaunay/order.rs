@@ -6,7 +6,8 @@
 //! follow a Hilbert curve (Hamilton 2006, "Compact Hilbert indices", as a table of states), so that the walk from one to the
 //! next is short and the memory it touches is warm. The triangulation does not depend on the order; only the time does.
 
-use super::canonical::{room, zeros};
+use super::canonical::room;
+use super::sort::radix_sort;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -24,7 +25,6 @@ pub(super) struct InsertionOrder {
     /// End of each round.
     pub ends: Vec<u32>,
     index_bits: u32,
-    position_bits: u32,
 }
 
 /// The order in which points are inserted.
@@ -56,43 +56,14 @@ pub(super) fn insertion_order(points: &[DVec3], bounds: [DVec3; 2]) -> Insertion
         keys,
         ends,
         index_bits,
-        position_bits: 3 * bits,
     }
 }
 
 impl InsertionOrder {
-    /// Indices of the points in insertion order, each with its position on the curve.
-    pub(super) fn par_iter(&self) -> impl IndexedParallelIterator<Item = (u32, f64)> + '_ {
-        self.keys.par_iter().map(|k| {
-            let position = k >> self.index_bits & ((1 << self.position_bits) - 1);
-            ((k & ((1 << self.index_bits) - 1)) as u32, position as f64)
-        })
-    }
-}
-
-/// Bits sorted at a time.
-const DIGIT: u32 = 11;
-
-/// Sorts numbers by their bits from `low` up; equal ones keep their order.
-pub(super) fn radix_sort(keys: &mut Vec<u64>, low: u32) {
-    let significant = u64::BITS - keys.iter().fold(0, |all, k| all | k).leading_zeros();
-    let mut other = zeros(keys.len());
-    for shift in (low..significant).step_by(DIGIT as usize) {
-        let digit = |k: u64| (k >> shift) as usize & ((1 << DIGIT) - 1);
-        let mut places = [0u32; 1 << DIGIT];
-        for &k in keys.iter() {
-            places[digit(k)] += 1;
-        }
-        let mut sum = 0;
-        for place in &mut places {
-            (*place, sum) = (sum, sum + *place);
-        }
-        for &k in keys.iter() {
-            let place = &mut places[digit(k)];
-            other[*place as usize] = k;
-            *place += 1;
-        }
-        std::mem::swap(keys, &mut other);
+    /// Indices of the points in insertion order.
+    pub(super) fn par_iter(&self) -> impl IndexedParallelIterator<Item = u32> + '_ {
+        let index = (1 << self.index_bits) - 1;
+        self.keys.par_iter().map(move |k| (k & index) as u32)
     }
 }
 
@@ -236,10 +207,7 @@ mod tests {
             .collect();
         let inserted = insertion_order(&points, [DVec3::ZERO, DVec3::splat(3000.0)]);
         assert!(inserted.ends.len() == 2 && inserted.ends[1] == 3000);
-        let (mut order, positions): (Vec<u32>, Vec<f64>) = inserted.par_iter().unzip();
-        for round in [0..inserted.ends[0] as usize, inserted.ends[0] as usize..3000] {
-            assert!(positions[round].is_sorted());
-        }
+        let mut order: Vec<u32> = inserted.par_iter().collect();
         order.sort_unstable();
         assert!(order.into_iter().eq(0..3000));
     }

@@ -1,19 +1,33 @@
 //! Many threads inserting into one triangulation, each among its own tetrahedra.
 //!
-//! In: a triangulation of the first rounds and the points of the others. Out: the triangulation of all but a few points, which
-//! are left to one thread. Steps, for each round (after Marot, Pellerin & Remacle 2019, "One machine, one minute, three
-//! billion tetrahedra"):
-//! 1. the space-filling curve is cut into one stretch a thread, so that each has as many points to insert; a thread owns the
-//!    tetrahedra of whose vertices at least three lie on its stretch;
-//! 2. every thread inserts its points as alone, but puts a point off when the walk or the cavity, with the tetrahedra around
-//!    it, leaves its own;
-//! 3. the curve is cut elsewhere, and points put off are tried again; after a few passes they wait for the next round.
+//! In: a triangulation of the first rounds and the points of the others. Out: the triangulation of all points, unless room ran
+//! out. Steps, for each round:
+//! 1. space is cut into slabs, one a thread, with equally many points of the round; a tetrahedron belongs to the first of the
+//!    threads in whose slabs it has vertices;
+//! 2. every thread inserts the points of its slab as alone, but puts a point off when the walk ends in a tetrahedron of
+//!    another, or the cavity with the tetrahedra around it holds one. The first thread spares the points farthest from its
+//!    cut;
+//! 3. points put off lie around the cuts. Each cut becomes a slab of its own, and the threads insert what was put off, while
+//!    the first, to whom the rest of space belongs, inserts what it spared;
+//! 4. few points are left, with tetrahedra that reach through several slabs. One thread inserts them, so that such
+//!    tetrahedra are not kept waiting to be cut up: in the next round they would stop many more points.
 //!
-//! Nothing is locked. An insertion changes only tetrahedra that its thread owns; what it makes has the new point and two
-//! vertices of an owned facet, so it is owned again; and the neighbours it looks at have two vertices on the stretch, so no
-//! other thread owns, and changes, them. Only walks read what others write, and their ends are tested. All shared words are
-//! atomic because the language cannot see this; on common processors a relaxed load or store is a plain one. Which points
-//! wait decides the numbering only: the set of tetrahedra is canonical.
+//! After Marot, Pellerin & Remacle 2019, "One machine, one minute, three billion tetrahedra"; there a tetrahedron belongs to
+//! the thread that has three of its vertices, and to nobody else, which stops twice as many points.
+//!
+//! Nothing is locked, and nothing depends on luck:
+//! * Each slot has at most one owner a pass. Who that is follows from its vertices; the owner stamps the slot before it
+//!   changes anything in it, so a slot with the stamp of an earlier pass is as that pass left it, and all threads read the
+//!   same vertices and come to the same owner. A thread that reads vertices while the owner changes them sees the stamp when
+//!   it looks again (the two fences; Boehm 2012, "Can seqlocks get along with programming language memory models?").
+//! * A thread changes only slots it owns: an insertion changes the cavity, the neighbours of the cavity, and slots that were
+//!   in no use, all stamped by then.
+//! * It decides only by what cannot change beside it: its own slots and, for a ghost, the tetrahedron behind. If that is
+//!   another's, it stays: to replace it, its owner would have to own the ghost, its neighbour, as well.
+//! * Walks read what others write and may go astray; their ends are tested.
+//!
+//! All shared words are atomic because the language cannot see this; on common processors a relaxed load or store is a plain
+//! one. Which points wait decides the numbering only: the set of tetrahedra is canonical.
 
 use super::filter::Filter;
 use super::insertion::{Inserter, Memory};
@@ -21,50 +35,87 @@ use super::lanes::{Lanes, Site, Task, with_lanes};
 use super::store::{INSIDE, NOTHING, Plain, SEEN, Store, VERTEX};
 use rayon::prelude::*;
 use std::ops::Range;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering, Ordering::Relaxed, fence};
+
+/// More threads than this are not used: stamps of all passes fit 16 bits.
+pub(super) const MOST_THREADS: usize = 256;
 
 /// Slots a thread takes from the common store at a time.
 const SLOTS: u32 = 1024;
 
-/// Where a pass begins to cut the curve, in stretches. The curve is closed for this purpose: one stretch may be the first
-/// part of it and the last.
-const CUTS: [f64; 2] = [0.0, 0.5];
-
 /// Fewer points than this a thread are not worth a pass.
 const WORTH_A_PASS: usize = 256;
+
+/// Positions looked at to cut a round into parts with equally many points.
+const SAMPLE: usize = 1 << 12;
+
+/// Half the thickness of the slab around a cut, in slabs of the first pass.
+const AROUND: f64 = 0.4;
+
+/// The share of a round that the first thread spares in the first pass of all, and how much smaller than in one round the
+/// share put off is in the next, which has eight times as many points: measured.
+const SPARED: [f64; 2] = [0.05, 0.4];
+
+/// Stamp of slots never used.
+const UNUSED: u16 = 0;
+/// Stamp of slots used before the first pass.
+const BEFORE: u16 = 1;
 
 /// The common store.
 struct Shared {
     vertices: Vec<[AtomicU32; 4]>,
     neighbours: Vec<[AtomicU32; 4]>,
+    /// For each slot who owned it last and in which pass.
+    stamps: Vec<AtomicU16>,
     /// First slot never used.
     next: AtomicU32,
     /// Set when a thread found no slot: all stop.
     full: AtomicBool,
 }
 
-/// Part of the closed curve: the positions `from..to`, or all others.
-#[derive(Clone, Copy)]
-struct Stretch {
-    from: f64,
-    to: f64,
-    others: bool,
+/// Slabs, by the positions between them, and the threads they belong to.
+struct Map {
+    cuts: Vec<f64>,
+    owners: Vec<u16>,
 }
 
-impl Stretch {
-    #[inline(always)]
-    fn holds(self, site: &Site) -> bool {
-        let p = site.position();
-        ((p >= self.from) & (p < self.to)) != self.others
+impl Map {
+    /// Slab `i` belongs to thread `i`.
+    fn one_each(cuts: Vec<f64>) -> Self {
+        let owners = (0..=cuts.len() as u16).collect();
+        Self { cuts, owners }
     }
+
+    /// The thread in whose slab a position lies.
+    #[inline(always)]
+    fn owner(&self, position: f64) -> u16 {
+        let slab = self
+            .cuts
+            .iter()
+            .fold(0, |n, &cut| n + usize::from(position >= cut));
+        self.owners[slab]
+    }
+}
+
+/// Slots that a thread has at hand.
+#[derive(Default)]
+struct Slots {
+    free: Vec<u32>,
+    fresh: Range<u32>,
 }
 
 /// The common store as one thread sees it.
 struct Worker<'a> {
     shared: &'a Shared,
-    stretch: Stretch,
-    free: Vec<u32>,
-    fresh: Range<u32>,
+    sites: &'a [Site],
+    map: &'a Map,
+    slots: &'a mut Slots,
+    /// This thread.
+    number: u16,
+    /// Stamp of the first thread in this pass.
+    pass: u16,
+    /// Stamp of this thread in this pass.
+    stamp: u16,
 }
 
 #[inline(always)]
@@ -127,11 +178,8 @@ impl Store for Worker<'_> {
     }
 
     #[inline(always)]
-    fn owns(&self, sites: &[Site], v: [u32; 4]) -> bool {
-        // A slot being written by another thread holds vertices of that thread, old or new. Spelled out: an iterator's
-        // closure would be compiled apart and called for every neighbour.
-        let [a, b, c, d] = v;
-        self.holds(sites, a) + self.holds(sites, b) + self.holds(sites, c) + self.holds(sites, d) >= 3
+    fn owns(&self, tet: u32) -> bool {
+        self.shared.stamps[tet as usize].load(Relaxed) == self.stamp || self.claims(tet)
     }
 
     #[inline(always)]
@@ -161,44 +209,73 @@ impl Store for Worker<'_> {
 
     #[inline(always)]
     fn reserve(&mut self, needed: usize) -> bool {
-        self.free.len() + self.fresh.len() >= needed || self.take_slots(needed)
+        self.slots.free.len() + self.slots.fresh.len() >= needed || self.take_slots(needed)
     }
 
     #[inline(always)]
     fn slot(&mut self) -> u32 {
-        let slot = self.free.pop().or_else(|| self.fresh.next());
-        slot.expect("slots were reserved")
+        let slot = self.slots.free.pop().or_else(|| self.slots.fresh.next());
+        let slot = slot.expect("slots were reserved");
+        self.stamp(slot);
+        slot
     }
 
     #[inline(always)]
     fn free(&mut self, tet: u32) {
         store(&self.shared.vertices[tet as usize], NOTHING);
-        self.free.push(tet);
+        self.slots.free.push(tet);
     }
 }
 
 impl Worker<'_> {
-    /// 1 when a vertex is on this thread's stretch; the infinite one never is.
-    #[inline(always)]
-    fn holds(&self, sites: &[Site], v: u32) -> u8 {
-        match sites.get(v as usize) {
-            Some(site) => u8::from(self.stretch.holds(site)),
-            None => 0,
+    /// Whether a tetrahedron without this thread's stamp is its own all the same; stamps it then.
+    #[inline(never)]
+    fn claims(&self, tet: u32) -> bool {
+        let stamp = &self.shared.stamps[tet as usize];
+        let last = stamp.load(Relaxed);
+        if last == UNUSED || last >= self.pass {
+            return false;
         }
+        let owner = self.owner(self.tet(tet));
+        // Vertices written by another thread in this pass come with its stamp, by now.
+        fence(Ordering::Acquire);
+        if owner != self.number || stamp.load(Relaxed) != last {
+            return false;
+        }
+        self.stamp(tet);
+        true
+    }
+
+    /// Stamps a slot, before anything in it is changed.
+    #[inline(always)]
+    fn stamp(&self, tet: u32) {
+        self.shared.stamps[tet as usize].store(self.stamp, Relaxed);
+        fence(Ordering::Release);
+    }
+
+    /// The first of the threads in whose slabs the vertices lie; none of a slot that holds no tetrahedron.
+    #[inline(always)]
+    fn owner(&self, vertices: [u32; 4]) -> u16 {
+        let of = |v: u32| match self.sites.get(v as usize) {
+            Some(site) => self.map.owner(site.position()),
+            None => u16::MAX,
+        };
+        let [a, b, c, d] = vertices;
+        of(a).min(of(b)).min(of(c)).min(of(d))
     }
 
     /// Takes slots from the common store; `false` when there are none.
     #[cold]
     fn take_slots(&mut self, needed: usize) -> bool {
-        while self.free.len() + self.fresh.len() < needed {
+        while self.slots.free.len() + self.slots.fresh.len() < needed {
             let start = self.shared.next.fetch_add(SLOTS, Relaxed);
             if u64::from(start) + u64::from(SLOTS) > self.shared.vertices.len() as u64 {
                 self.shared.next.fetch_sub(SLOTS, Relaxed);
                 self.shared.full.store(true, Relaxed);
                 return false;
             }
-            self.free.extend(self.fresh.clone());
-            self.fresh = start..start + SLOTS;
+            self.slots.free.extend(self.slots.fresh.clone());
+            self.slots.fresh = start..start + SLOTS;
         }
         true
     }
@@ -215,157 +292,182 @@ pub(super) fn insert_rounds(
     threads: usize,
     room: usize,
 ) -> (Plain, Vec<u32>) {
+    debug_assert!((2..=MOST_THREADS).contains(&threads));
     let start = plain.any().expect("a triangulation to start from");
-    let shared = share(plain, room);
-    let mut workers: Vec<(Worker, Memory)> = (0..threads)
-        .map(|_| {
-            let worker = Worker {
-                shared: &shared,
-                stretch: Stretch {
-                    from: 0.0,
-                    to: 0.0,
-                    others: false,
-                },
-                free: Vec::new(),
-                fresh: 0..0,
-            };
-            (worker, Memory::new(sites.len(), start))
-        })
-        .collect();
+    let mut team = Team {
+        shared: share(plain, room),
+        sites,
+        filter,
+        members: (0..threads)
+            .map(|_| (Slots::default(), Memory::new(sites.len(), start)))
+            .collect(),
+        passes: 0,
+        spared: SPARED[0],
+    };
     let mut waiting = Vec::new();
     for round in rounds {
-        waiting.extend(round.clone());
-        for cut in CUTS {
-            if waiting.len() < WORTH_A_PASS * threads || shared.full.load(Relaxed) {
-                break;
-            }
-            let position = |&v: &u32| sites[v as usize].position();
-            waiting.sort_by(|a, b| position(a).total_cmp(&position(b)).then(a.cmp(b)));
-            waiting = pass(
-                &mut workers,
-                sites,
-                filter,
-                &waiting,
-                &cuts(sites, round, threads, cut),
-            );
-        }
-    }
-    let mut free = Vec::new();
-    for (worker, _) in workers {
-        free.extend(worker.free);
-        free.extend(worker.fresh);
+        waiting = team.insert_round(waiting, round.clone());
     }
     waiting.sort_unstable();
-    (unshare(shared, free), waiting)
+    let mut free = Vec::new();
+    for (slots, _) in team.members {
+        free.extend(slots.free);
+        free.extend(slots.fresh);
+    }
+    (unshare(team.shared, free), waiting)
 }
 
-/// Positions at which `count` stretches begin: those of points evenly spaced in a round, the first `shift` stretches from its
-/// beginning. Points put off lie around the cuts of an earlier pass, so the cuts do not depend on them.
-fn cuts(sites: &[Site], round: &Range<u32>, count: usize, shift: f64) -> Vec<f64> {
-    let place = |i: usize| ((i as f64 + shift) / count as f64 * round.len() as f64) as usize;
-    (0..count)
-        .map(|i| sites[round.start as usize + place(i)].position())
-        .collect()
-}
-
-/// Every worker tries its part of `points`, which follow the curve; returns those put off.
-fn pass(
-    workers: &mut [(Worker, Memory)],
-    sites: &[Site],
+/// All threads, with what they keep from pass to pass.
+struct Team<'a> {
+    shared: Shared,
+    sites: &'a [Site],
     filter: Filter,
-    points: &[u32],
-    cuts: &[f64],
-) -> Vec<u32> {
-    let count = workers.len();
-    // Points of equal position are on the same side of a cut, so that a point and its tetrahedra belong to the same thread.
-    let bounds: Vec<usize> = cuts
-        .iter()
-        .map(|&cut| points.partition_point(|&v| sites[v as usize].position() < cut))
-        .collect();
-    let put_off: Vec<Vec<u32>> = workers
-        .par_iter_mut()
-        .enumerate()
-        .with_max_len(1)
-        .map(|(i, (worker, memory))| {
-            let next = (i + 1) % count;
-            let (from, to) = (bounds[i], bounds[next]);
-            let wraps = next == 0;
-            worker.stretch = Stretch {
-                from: if wraps { cuts[0] } else { cuts[i] },
-                to: if wraps { cuts[i] } else { cuts[next] },
-                others: wraps,
-            };
-            let parts = if wraps {
-                [&points[from..], &points[..to]]
-            } else {
-                [&points[from..to], &[]]
-            };
-            with_lanes(Part {
-                worker,
-                memory,
-                sites,
-                filter,
-                parts,
+    members: Vec<(Slots, Memory)>,
+    passes: usize,
+    /// The share of a round that the first thread spares.
+    spared: f64,
+}
+
+impl Team<'_> {
+    /// Tries the points of a round and those that wait from the rounds before; returns those that wait now.
+    fn insert_round(&mut self, mut waiting: Vec<u32>, round: Range<u32>) -> Vec<u32> {
+        let count = self.members.len();
+        if waiting.len() + round.len() < WORTH_A_PASS * count {
+            waiting.extend(round);
+            return waiting;
+        }
+        let positions = sample(self.sites, round.clone());
+        let quantile = |share: f64| positions[(share * positions.len() as f64) as usize];
+        let spared = quantile(self.spared);
+        let slab = (1.0 - self.spared) / count as f64;
+        let begin = self.spared;
+        let cut = |i: f64| quantile(begin + i * slab);
+        let cuts = 1..count;
+
+        let slabs = Map::one_each(cuts.clone().map(|i| cut(i as f64)).collect());
+        let rest = self.pass(&waiting, round.clone(), &slabs, spared);
+        let around = Map {
+            cuts: cuts
+                .clone()
+                .flat_map(|i| [cut(i as f64 - AROUND), cut(i as f64 + AROUND)])
+                .collect(),
+            owners: cuts.clone().flat_map(|i| [0, i as u16]).chain([0]).collect(),
+        };
+        let put_off = rest.put_off.len() as f64 / (cuts.len() * round.len()) as f64;
+        self.spared = (SPARED[1] * put_off).min(SPARED[0]);
+        let waiting = [rest.put_off, rest.spared].concat();
+        let rest = self.pass(&waiting, 0..0, &around, f64::NEG_INFINITY);
+        let rest = self.pass(&rest.put_off, 0..0, &Map::one_each(Vec::new()), f64::NEG_INFINITY);
+        rest.put_off
+    }
+
+    /// Every thread tries the points in its slabs, but for those at positions below `spared`.
+    fn pass(&mut self, waiting: &[u32], round: Range<u32>, map: &Map, spared: f64) -> Rest {
+        self.passes += 1;
+        let pass = (self.passes * self.members.len()) as u16 + BEFORE;
+        let (shared, sites, filter) = (&self.shared, self.sites, self.filter);
+        let rests: Vec<Rest> = (0..map.owners.len().min(self.members.len()) as u16)
+            .into_par_iter()
+            .zip(&mut self.members)
+            .with_max_len(1)
+            .map(|(number, (slots, memory))| {
+                with_lanes(Part {
+                    worker: Worker {
+                        shared,
+                        sites,
+                        map,
+                        slots,
+                        number,
+                        pass,
+                        stamp: pass + number,
+                    },
+                    memory,
+                    filter,
+                    points: waiting.iter().copied().chain(round.clone()),
+                    spared,
+                })
             })
-        })
+            .collect();
+        let mut all = Rest::default();
+        for rest in rests {
+            all.put_off.extend(rest.put_off);
+            all.spared.extend(rest.spared);
+        }
+        all
+    }
+}
+
+/// Positions of a sample of points, in order, with the last once more.
+fn sample(sites: &[Site], round: Range<u32>) -> Vec<f64> {
+    let step = (round.len() / SAMPLE).max(1);
+    let mut positions: Vec<f64> = round
+        .step_by(step)
+        .map(|v| sites[v as usize].position())
         .collect();
-    put_off.concat()
+    positions.sort_unstable_by(f64::total_cmp);
+    positions.extend(positions.last().copied());
+    positions
 }
 
 /// One thread's part of a pass.
-struct Part<'a, 'b> {
-    worker: &'a mut Worker<'b>,
+struct Part<'a, I> {
+    worker: Worker<'a>,
     memory: &'a mut Memory,
-    sites: &'a [Site],
     filter: Filter,
-    parts: [&'a [u32]; 2],
+    points: I,
+    spared: f64,
 }
 
-impl Task for Part<'_, '_> {
-    type Output = Vec<u32>;
+/// The points that a pass did not insert, in the order they came in.
+#[derive(Default)]
+struct Rest {
+    put_off: Vec<u32>,
+    spared: Vec<u32>,
+}
+
+impl<I: Iterator<Item = u32>> Task for Part<'_, I> {
+    type Output = Rest;
 
     #[inline(always)]
-    fn run<L: Lanes>(self, lanes: L) -> Vec<u32> {
-        let Self {
-            worker,
-            memory,
-            sites,
-            filter,
-            parts,
-        } = self;
+    fn run<L: Lanes>(self, lanes: L) -> Rest {
+        let mut worker = self.worker;
         let mut inserter = Inserter {
-            sites,
-            filter,
+            sites: worker.sites,
+            filter: self.filter,
             lanes,
-            memory,
+            memory: self.memory,
         };
-        let mut put_off = Vec::new();
-        for &v in parts.into_iter().flatten() {
-            if worker.shared.full.load(Relaxed) || !inserter.insert(worker, v) {
-                put_off.push(v);
+        let mut rest = Rest::default();
+        for v in self.points {
+            let position = worker.sites[v as usize].position();
+            if worker.map.owner(position) != worker.number {
+                continue;
+            }
+            if position < self.spared {
+                rest.spared.push(v);
+            } else if worker.shared.full.load(Relaxed) || !inserter.insert(&mut worker, v) {
+                rest.put_off.push(v);
             }
         }
-        put_off
+        rest
     }
 }
 
-/// Makes every word atomic and adds room. What is there is converted in place; the room is touched for the first time here,
-/// by all threads.
+/// Makes every word atomic, which costs nothing, in `room` slots. Most of the room is touched first by the thread that fills
+/// it.
 fn share(plain: Plain, room: usize) -> Shared {
     let used = plain.vertices.len();
-    let more = room.saturating_sub(used);
-    let atomic = |words: Vec<[u32; 4]>, blank: [u32; 4]| {
-        let mut words: Vec<[AtomicU32; 4]> = words
-            .into_iter()
-            .map(|[a, b, c, d]| [a, b, c, d].map(AtomicU32::new))
-            .collect();
-        words.reserve_exact(more);
-        words.par_extend((0..more).into_par_iter().map(|_| blank.map(AtomicU32::new)));
-        words
+    let atomic = |words: Vec<[u32; 4]>| -> Vec<[AtomicU32; 4]> {
+        let mut all = vec![[0; 4]; room.max(used)];
+        all[..used].copy_from_slice(&words);
+        all.into_iter().map(|w| w.map(AtomicU32::new)).collect()
     };
+    let mut stamps = vec![UNUSED; room.max(used)];
+    stamps[..used].fill(BEFORE);
     Shared {
-        vertices: atomic(plain.vertices, NOTHING),
-        neighbours: atomic(plain.neighbours, [0; 4]),
+        vertices: atomic(plain.vertices),
+        neighbours: atomic(plain.neighbours),
+        stamps: stamps.into_iter().map(AtomicU16::new).collect(),
         next: AtomicU32::new(used as u32),
         full: AtomicBool::new(false),
     }
@@ -379,8 +481,12 @@ fn unshare(shared: Shared, free: Vec<u32>) -> Plain {
         words.truncate(used);
         words
     };
+    let mut vertices = plain(shared.vertices);
+    for &slot in &free {
+        vertices[slot as usize] = NOTHING;
+    }
     Plain {
-        vertices: plain(shared.vertices),
+        vertices,
         neighbours: plain(shared.neighbours),
         free,
     }

@@ -6,7 +6,6 @@
 //! thread is always so.
 
 use super::insertion::INF;
-use super::lanes::Site;
 
 /// Bit of the first vertex: the tetrahedron was looked at.
 pub(super) const SEEN: u32 = 1 << 30;
@@ -35,8 +34,8 @@ pub(super) trait Store {
     fn set_neighbours(&mut self, tet: u32, neighbours: [u32; 4]);
     /// Writes the neighbour across a packed facet.
     fn set_neighbour(&mut self, facet: u32, neighbour: u32);
-    /// Whether this thread may touch a tetrahedron of these vertices.
-    fn owns(&self, sites: &[Site], vertices: [u32; 4]) -> bool;
+    /// Whether this thread may touch a tetrahedron.
+    fn owns(&self, tet: u32) -> bool;
     /// Visits a tetrahedron: 1 the first time, else 0.
     fn visit(&mut self, tet: u32) -> usize;
     /// Notes whether a visited tetrahedron is in conflict.
@@ -126,7 +125,7 @@ impl Store for Plain {
     }
 
     #[inline(always)]
-    fn owns(&self, _sites: &[Site], _vertices: [u32; 4]) -> bool {
+    fn owns(&self, _tet: u32) -> bool {
         true
     }
 
