@@ -92,7 +92,7 @@ pub fn ticks(lo: f64, hi: f64, count: usize) -> Vec<f64> {
     (first..=last).map(|i| i as f64 * step).collect()
 }
 
-/// A number for people: three significant digits below 1000, whole above, no trailing zeros.
+/// A number for people: three significant digits below 1000, whole above, no trailing zeros; a power of ten below 0.0001.
 pub fn pretty(x: f64) -> String {
     if !x.is_finite() {
         return "-".to_owned();
@@ -100,6 +100,13 @@ pub fn pretty(x: f64) -> String {
     let a = x.abs();
     if a == 0.0 {
         return "0".to_owned();
+    }
+    if a < 1e-4 {
+        let text = format!("{x:.2e}");
+        let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
+        let digits = digits.trim_end_matches('0').trim_end_matches('.');
+        // No line may break inside a number.
+        return format!("{digits}\u{a0}×\u{a0}10{}", superscript(power));
     }
     let decimals = if a >= 999.5 {
         0
@@ -111,6 +118,20 @@ pub fn pretty(x: f64) -> String {
         text.truncate(text.trim_end_matches('0').trim_end_matches('.').len());
     }
     if text == "-0" { "0".to_owned() } else { text }
+}
+
+fn superscript(number: &str) -> String {
+    number
+        .chars()
+        .map(|c| match c {
+            '-' => '⁻',
+            '1' => '¹',
+            '2' => '²',
+            '3' => '³',
+            // The others stand together, from zero up.
+            c => char::from_u32(0x2070 + u32::from(c) - u32::from('0')).unwrap_or(c),
+        })
+        .collect()
 }
 
 /// 1, 2 and 5 times powers of ten between two logarithms.
@@ -466,6 +487,8 @@ mod tests {
             (0.012345, "0.0123"),
             (-2.5, "-2.5"),
             (100.0, "100"),
+            (1.39e-5, "1.39\u{a0}×\u{a0}10⁻⁵"),
+            (-2e-17, "-2\u{a0}×\u{a0}10⁻¹⁷"),
             (f64::NAN, "-"),
         ] {
             assert_eq!(pretty(x), text);
