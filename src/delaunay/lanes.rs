@@ -1,7 +1,7 @@
-//! The arithmetic of the filters: one tetrahedron against one point, four corners at a time where the processor can.
+//! The arithmetic of the filters: one tetrahedron against one point, four corners at a time where the processor can; and four
+//! numbers at a time for whom they help elsewhere.
 //!
-//! In: corners and a point as [`Site`]s. Out: the in-sphere determinant with the largest lift, and the orientations of the
-//! four facets. With the corners relative to the point as rows `a, b, c, d` all 2x2 minors of neighbouring rows are one
+//! In: corners and a point as [`Site`]s. Out: the in-sphere determinant with the largest lift. With the corners relative to the point as rows `a, b, c, d` all 2x2 minors of neighbouring rows are one
 //! vector operation on a rotated copy, and so are the four 3x3 minors; the determinant is their product with the lifts.
 //!
 //! Which arithmetic runs is decided once a triangulation ([`Lanes`] is a type parameter of the insertion, and
@@ -9,6 +9,8 @@
 //! sign that clears the bounds of `filter` may be used: signs, and with them the triangulation, do not depend on the choice.
 
 use glam::DVec3;
+#[cfg(target_arch = "x86_64")]
+use std::arch::x86_64::{__m256d, _CMP_GT_OQ};
 
 /// A point that fills one vector register, so that one load fetches it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -45,9 +47,32 @@ pub(crate) type Corners<'a> = [&'a Site; 4];
 
 /// How the arithmetic is done.
 pub(crate) trait Lanes: Copy + Send + Sync {
+    /// Four numbers. The operations on them round like those on single numbers.
+    type Four: Copy;
+
     /// The in-sphere determinant of the corners relative to `p`, in an order of operations no deeper than Shewchuk's (stage
     /// A), and the largest lift.
     fn insphere(self, corners: Corners, p: &Site) -> (f64, f64);
+    /// From an array.
+    fn four(self, v: [f64; 4]) -> Self::Four;
+    /// To an array.
+    fn array(self, v: Self::Four) -> [f64; 4];
+    /// Sums.
+    fn add(self, a: Self::Four, b: Self::Four) -> Self::Four;
+    /// Differences.
+    fn sub(self, a: Self::Four, b: Self::Four) -> Self::Four;
+    /// Products.
+    fn mul(self, a: Self::Four, b: Self::Four) -> Self::Four;
+    /// Quotients.
+    fn div(self, a: Self::Four, b: Self::Four) -> Self::Four;
+    /// Square roots.
+    fn sqrt(self, v: Self::Four) -> Self::Four;
+    /// Magnitudes.
+    fn abs(self, v: Self::Four) -> Self::Four;
+    /// The smaller of each two; no care is taken of NaN.
+    fn min(self, a: Self::Four, b: Self::Four) -> Self::Four;
+    /// Bit `k` when number `k` is larger than the other's.
+    fn larger(self, a: Self::Four, b: Self::Four) -> u8;
 }
 
 /// One number at a time.
@@ -55,6 +80,8 @@ pub(crate) trait Lanes: Copy + Send + Sync {
 pub(crate) struct Scalar;
 
 impl Lanes for Scalar {
+    type Four = [f64; 4];
+
     #[inline(always)]
     fn insphere(self, corners: Corners, p: &Site) -> (f64, f64) {
         let p = p.point();
@@ -75,6 +102,62 @@ impl Lanes for Scalar {
         let det = (la * bcd - lb * cda) + (lc * dab - ld * abc);
         (det, larger(larger(la, lb), larger(lc, ld)))
     }
+
+    #[inline(always)]
+    fn four(self, v: [f64; 4]) -> [f64; 4] {
+        v
+    }
+
+    #[inline(always)]
+    fn array(self, v: [f64; 4]) -> [f64; 4] {
+        v
+    }
+
+    #[inline(always)]
+    fn add(self, a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+        each(a, b, |a, b| a + b)
+    }
+
+    #[inline(always)]
+    fn sub(self, a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+        each(a, b, |a, b| a - b)
+    }
+
+    #[inline(always)]
+    fn mul(self, a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+        each(a, b, |a, b| a * b)
+    }
+
+    #[inline(always)]
+    fn div(self, a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+        each(a, b, |a, b| a / b)
+    }
+
+    #[inline(always)]
+    fn sqrt(self, v: [f64; 4]) -> [f64; 4] {
+        v.map(f64::sqrt)
+    }
+
+    #[inline(always)]
+    fn abs(self, v: [f64; 4]) -> [f64; 4] {
+        v.map(f64::abs)
+    }
+
+    #[inline(always)]
+    fn min(self, a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+        each(a, b, |a, b| if a < b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn larger(self, a: [f64; 4], b: [f64; 4]) -> u8 {
+        (0..4).fold(0, |bits, k| bits | u8::from(a[k] > b[k]) << k)
+    }
+}
+
+/// One operation on each two numbers.
+#[inline(always)]
+fn each(a: [f64; 4], b: [f64; 4], f: impl Fn(f64, f64) -> f64) -> [f64; 4] {
+    [f(a[0], b[0]), f(a[1], b[1]), f(a[2], b[2]), f(a[3], b[3])]
 }
 
 /// Something to be compiled for the instructions at hand.
@@ -115,9 +198,10 @@ pub(crate) struct Avx(pulp::x86::V3);
 
 #[cfg(target_arch = "x86_64")]
 impl Lanes for Avx {
+    type Four = __m256d;
+
     #[inline(always)]
     fn insphere(self, corners: Corners, p: &Site) -> (f64, f64) {
-        use std::arch::x86_64::__m256d;
         let (avx, avx2, fma, sse2) = (self.0.avx, self.0.avx2, self.0.fma, self.0.sse2);
         let load = |q: &Site| -> __m256d { pulp::cast(q.lanes) };
         let p = load(p);
@@ -148,5 +232,56 @@ impl Lanes for Avx {
         let largest = sse2._mm_max_pd(low, high);
         let largest = sse2._mm_max_sd(largest, sse2._mm_unpackhi_pd(largest, largest));
         (sse2._mm_cvtsd_f64(det), sse2._mm_cvtsd_f64(largest))
+    }
+
+    #[inline(always)]
+    fn four(self, v: [f64; 4]) -> __m256d {
+        pulp::cast(v)
+    }
+
+    #[inline(always)]
+    fn array(self, v: __m256d) -> [f64; 4] {
+        pulp::cast(v)
+    }
+
+    #[inline(always)]
+    fn add(self, a: __m256d, b: __m256d) -> __m256d {
+        self.0.avx._mm256_add_pd(a, b)
+    }
+
+    #[inline(always)]
+    fn sub(self, a: __m256d, b: __m256d) -> __m256d {
+        self.0.avx._mm256_sub_pd(a, b)
+    }
+
+    #[inline(always)]
+    fn mul(self, a: __m256d, b: __m256d) -> __m256d {
+        self.0.avx._mm256_mul_pd(a, b)
+    }
+
+    #[inline(always)]
+    fn div(self, a: __m256d, b: __m256d) -> __m256d {
+        self.0.avx._mm256_div_pd(a, b)
+    }
+
+    #[inline(always)]
+    fn sqrt(self, v: __m256d) -> __m256d {
+        self.0.avx._mm256_sqrt_pd(v)
+    }
+
+    #[inline(always)]
+    fn abs(self, v: __m256d) -> __m256d {
+        self.0.avx._mm256_andnot_pd(pulp::cast([-0.0f64; 4]), v)
+    }
+
+    #[inline(always)]
+    fn min(self, a: __m256d, b: __m256d) -> __m256d {
+        self.0.avx._mm256_min_pd(a, b)
+    }
+
+    #[inline(always)]
+    fn larger(self, a: __m256d, b: __m256d) -> u8 {
+        let avx = self.0.avx;
+        avx._mm256_movemask_pd(avx._mm256_cmp_pd::<_CMP_GT_OQ>(a, b)) as u8
     }
 }

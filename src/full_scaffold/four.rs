@@ -1,108 +1,108 @@
-//! Four tetrahedra at a time: plain arithmetic on four numbers, which compilers turn into vector instructions.
+//! Four tetrahedra at a time: plain arithmetic on four numbers, by vector instructions where the processor has them.
 //!
 //! Every operation rounds as the one on single numbers does and none is fused, so results are the same bits on every
 //! processor and beside the code for one tetrahedron.
 
+use crate::delaunay::lanes::Lanes;
 use glam::DVec3;
-use std::ops::{Add, Mul, Sub};
+use std::ops::{Add, Div, Mul, Sub};
 
 /// Four numbers.
-#[derive(Clone, Copy, Debug)]
-#[repr(align(32))]
-pub(super) struct Four(pub [f64; 4]);
+#[derive(Clone, Copy)]
+pub(super) struct Four<L: Lanes>(L, L::Four);
 
-impl Four {
+impl<L: Lanes> Four<L> {
+    #[inline(always)]
+    pub(super) fn new(lanes: L, v: [f64; 4]) -> Self {
+        Self(lanes, lanes.four(v))
+    }
+
     /// The same number four times.
     #[inline(always)]
-    pub(super) fn all(v: f64) -> Self {
-        Self([v; 4])
+    pub(super) fn all(lanes: L, v: f64) -> Self {
+        Self::new(lanes, [v; 4])
     }
 
     #[inline(always)]
-    fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        let (a, b) = (self.0, other.0);
-        Self([f(a[0], b[0]), f(a[1], b[1]), f(a[2], b[2]), f(a[3], b[3])])
-    }
-
-    #[inline(always)]
-    pub(super) fn map(self, f: impl Fn(f64) -> f64) -> Self {
-        let [a, b, c, d] = self.0;
-        Self([f(a), f(b), f(c), f(d)])
+    pub(super) fn array(self) -> [f64; 4] {
+        self.0.array(self.1)
     }
 
     #[inline(always)]
     pub(super) fn sqrt(self) -> Self {
-        self.map(f64::sqrt)
+        Self(self.0, self.0.sqrt(self.1))
     }
 
     #[inline(always)]
     pub(super) fn abs(self) -> Self {
-        self.map(f64::abs)
+        Self(self.0, self.0.abs(self.1))
     }
 
     /// The smaller of each two; no care is taken of NaN.
     #[inline(always)]
     pub(super) fn min(self, other: Self) -> Self {
-        self.zip(other, |a, b| if a < b { a } else { b })
-    }
-
-    #[inline(always)]
-    pub(super) fn over(self, other: Self) -> Self {
-        self.zip(other, |a, b| a / b)
+        Self(self.0, self.0.min(self.1, other.1))
     }
 
     /// Bit `k` when number `k` is larger than the other's.
     #[inline(always)]
     pub(super) fn larger(self, other: Self) -> u8 {
-        let (a, b) = (self.0, other.0);
-        (0..4).fold(0, |bits, k| bits | u8::from(a[k] > b[k]) << k)
+        self.0.larger(self.1, other.1)
     }
 }
 
-impl Add for Four {
+impl<L: Lanes> Add for Four<L> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        self.zip(other, |a, b| a + b)
+        Self(self.0, self.0.add(self.1, other.1))
     }
 }
 
-impl Sub for Four {
+impl<L: Lanes> Sub for Four<L> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        self.zip(other, |a, b| a - b)
+        Self(self.0, self.0.sub(self.1, other.1))
     }
 }
 
-impl Mul for Four {
+impl<L: Lanes> Mul for Four<L> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
-        self.zip(other, |a, b| a * b)
+        Self(self.0, self.0.mul(self.1, other.1))
+    }
+}
+
+impl<L: Lanes> Div for Four<L> {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Self(self.0, self.0.div(self.1, other.1))
     }
 }
 
 /// Four vectors, with the operations of [`DVec3`] in the same order.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct FourVectors {
-    pub x: Four,
-    pub y: Four,
-    pub z: Four,
+#[derive(Clone, Copy)]
+pub(super) struct FourVectors<L: Lanes> {
+    pub x: Four<L>,
+    pub y: Four<L>,
+    pub z: Four<L>,
 }
 
-impl FourVectors {
+impl<L: Lanes> FourVectors<L> {
     #[inline(always)]
-    pub(super) fn new([a, b, c, d]: [DVec3; 4]) -> Self {
+    pub(super) fn new(lanes: L, [a, b, c, d]: [DVec3; 4]) -> Self {
         Self {
-            x: Four([a.x, b.x, c.x, d.x]),
-            y: Four([a.y, b.y, c.y, d.y]),
-            z: Four([a.z, b.z, c.z, d.z]),
+            x: Four::new(lanes, [a.x, b.x, c.x, d.x]),
+            y: Four::new(lanes, [a.y, b.y, c.y, d.y]),
+            z: Four::new(lanes, [a.z, b.z, c.z, d.z]),
         }
     }
 
     #[inline(always)]
-    pub(super) fn dot(self, o: Self) -> Four {
+    pub(super) fn dot(self, o: Self) -> Four<L> {
         self.x * o.x + self.y * o.y + self.z * o.z
     }
 
@@ -116,7 +116,7 @@ impl FourVectors {
     }
 
     #[inline(always)]
-    pub(super) fn scale(self, s: Four) -> Self {
+    pub(super) fn scale(self, s: Four<L>) -> Self {
         Self {
             x: self.x * s,
             y: self.y * s,
@@ -140,11 +140,5 @@ impl FourVectors {
             y: self.y - o.y,
             z: self.z - o.z,
         }
-    }
-
-    /// Vector `k`.
-    #[inline(always)]
-    pub(super) fn get(&self, k: usize) -> DVec3 {
-        DVec3::new(self.x.0[k], self.y.0[k], self.z.0[k])
     }
 }

@@ -1,6 +1,7 @@
 //! Full scaffold: flow types, arcs and sinks of the medial scaffold of all generators, by exact signs (Leymarie & Kimia
 //! 2007), read off the Delaunay triangulation.
 
+mod facets;
 pub mod flow;
 mod four;
 pub mod merged;

@@ -1,8 +1,9 @@
 //! The full scaffold as read off a Delaunay triangulation.
 //!
-//! In: [`Triangulation`]. Out: [`FullScaffold`]. Steps: (1) sphere and signs of every tetrahedron; (2) flow type of every
-//! triangle from the two signs across it and its angles, and whether the two spheres coincide; (3) critical points counted,
-//! sheet sources through the edges that face an obtuse angle; (4) vertices whose spheres coincide gathered.
+//! In: [`Triangulation`]. Out: [`FullScaffold`]. Steps: (1) sphere and signs of every tetrahedron (`spheres`, four at a
+//! time by `four`); (2) flow type of every triangle from the two signs across it and its angles, and whether the two spheres
+//! coincide (`facets`); (3) critical points counted, sheet sources through the edges that face an obtuse angle; (4) vertices
+//! whose spheres coincide gathered (`merged`).
 //!
 //! After Leymarie & Kimia 2007 (types of shocks) and Siersma 1999, Giesen & John 2008 (critical points of the distance to
 //! points are the Delaunay simplices that hold their centre and whose smallest ball is empty). We read the scaffold off the
@@ -10,10 +11,11 @@
 //! a generic weighted point set infinitely near (see [`crate::geometry::predicates`]), hence arcs are acyclic and the
 //! alternating sum of critical points is 1 for every input. Cost: `O(tetrahedra)`.
 
+use super::facets::{CHUNK, classify, tell_both_sides};
 use super::flow::{CriticalCounts, FlowType};
 use super::merged::{DegenerateVertex, degenerate_vertices};
 use super::planar::{self, PlanarScaffold};
-use super::spheres::{Geometries, Signs, cospherical};
+use super::spheres::{Geometries, Signs};
 use crate::delaunay::counters::Counters;
 use crate::delaunay::door::Frame;
 use crate::delaunay::lanes::with_lanes;
@@ -257,9 +259,6 @@ pub fn full_scaffold(t: &Triangulation) -> Result<FullScaffold, DelaunayError> {
     Ok(out)
 }
 
-/// Tetrahedra handled by one task at a time.
-const CHUNK: usize = 1 << 14;
-
 /// What step 1 gives.
 struct Geometry {
     /// Circumscribed spheres, mm.
@@ -305,116 +304,6 @@ fn geometry(t: &Triangulation, points: &[DVec3], frame: Frame) -> Geometry {
         spheres,
         signs,
         obtuse,
-    }
-}
-
-/// What step 2 gives.
-struct Classified {
-    /// As in [`FullScaffold`], but bits of coinciding spheres only on the side of the owner, the tetrahedron of smaller id.
-    signs: Vec<u8>,
-    flows: Vec<u8>,
-    /// Tetrahedra that own a facet across which the spheres coincide.
-    tied: Vec<u32>,
-    /// [`Geometries::obtuse`] of owned facets.
-    obtuse: Vec<u16>,
-    /// For each vertex the number of owned facets with an obtuse angle that faces an edge of which it is the smaller end.
-    facing: Counters,
-    counts: CriticalCounts,
-}
-
-/// Step 2: the facets each tetrahedron owns, and the numbers of critical points seen on the way. Without branches: which
-/// facets are owned and how they flow is as good as random.
-fn classify(
-    t: &Triangulation,
-    points: &[DVec3],
-    grid: Grid,
-    signs: &[Signs],
-    mut obtuse: Vec<u16>,
-) -> Classified {
-    let n = signs.len();
-    let (mut all_signs, mut flows) = (vec![0u8; n], vec![0u8; n]);
-    let facing = Counters::new(t.points.len());
-    let parts = (
-        all_signs.par_chunks_mut(CHUNK),
-        flows.par_chunks_mut(CHUNK),
-        obtuse.par_chunks_mut(CHUNK),
-    )
-        .into_par_iter()
-        .enumerate()
-        .map(|(chunk, (all_signs, flows, obtuse))| {
-            let [mut sinks, mut sources, mut relays] = [0u64; 3];
-            let mut tied = Vec::new();
-            let first = (chunk * CHUNK) as u32;
-            for (((out, flow), codes), tet) in all_signs.iter_mut().zip(flows).zip(obtuse).zip(first..) {
-                let own = signs[tet as usize];
-                let tet = TetId(tet);
-                sinks += u64::from(own.outside() == 15);
-                let (mut ties, mut flow_bits, mut owned_codes) = (0u8, 0u8, 0u16);
-                for index in 0..4u8 {
-                    let other = t.mirror(Facet { tet, index });
-                    let owned = tet < other.tet;
-                    let is_finite = t.is_finite(other.tet);
-                    // What is far away is only looked at when it is wanted.
-                    let looked_at = if owned & is_finite { other.tet } else { tet };
-                    let beyond = signs[looked_at.index()];
-                    let other_outside = u8::from(!is_finite) | beyond.outside() >> other.index;
-                    if owned & is_finite
-                        && own.may_coincide(beyond)
-                        && cospherical(grid, t.tet(tet).map(|v| points[v.index()]), {
-                            points[t.tet(other.tet)[other.index as usize].index()]
-                        })
-                    {
-                        ties |= 16 << index;
-                    }
-                    let owned = u8::from(owned);
-                    let gabriel = own.outside() >> index & other_outside & 1;
-                    let code = *codes >> (4 * index) & 15;
-                    let obtuse = u8::from(code != 0);
-                    flow_bits |= (owned * (2 * (1 - gabriel) + obtuse)) << (2 * index);
-                    owned_codes |= (code * u16::from(owned)) << (4 * index);
-                    sources += u64::from(owned & gabriel & (1 - obtuse));
-                    relays += u64::from(owned & gabriel & obtuse);
-                    // The edge of another angle counts nothing.
-                    let [smaller, _] = facing_edge(t, tet, index, code.wrapping_sub(1));
-                    facing.add(smaller as usize, u32::from(owned & obtuse));
-                }
-                *out = own.outside() | ties;
-                *flow = flow_bits;
-                *codes = owned_codes;
-                if ties != 0 {
-                    tied.push(tet.0);
-                }
-            }
-            ([sinks, sources, relays], tied)
-        });
-    let parts: Vec<([u64; 3], Vec<u32>)> = parts.collect();
-    let [sinks, curve_sources, relays] = [0, 1, 2].map(|k| parts.iter().map(|(c, _)| c[k]).sum());
-    Classified {
-        signs: all_signs,
-        flows,
-        tied: parts.into_iter().flat_map(|(_, tied)| tied).collect(),
-        obtuse,
-        facing,
-        counts: CriticalCounts {
-            sinks,
-            curve_sources,
-            relays,
-            ..CriticalCounts::default()
-        },
-    }
-}
-
-/// Copies the bits of coinciding spheres from the owners of facets to the other sides. Few clouds have any.
-fn tell_both_sides(t: &Triangulation, classified: &mut Classified) {
-    let signs = &mut classified.signs;
-    for tet in classified.tied.iter().copied().map(TetId) {
-        // Bits of facets that others own may have come from them.
-        for facet in (0..4u8).map(|index| Facet { tet, index }) {
-            let other = t.mirror(facet);
-            if facet < other && signs[tet.index()] >> (4 + facet.index) & 1 == 1 {
-                signs[other.tet.index()] |= 16 << other.index;
-            }
-        }
     }
 }
 

@@ -79,7 +79,7 @@ impl Task for Geometries<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(self, _lanes: L) {
+    fn run<L: Lanes>(self, lanes: L) {
         let Self {
             t,
             points,
@@ -98,7 +98,7 @@ impl Task for Geometries<'_> {
                 <&mut [Signs; 4]>::try_from(&mut *signs),
                 <&mut [u16; 4]>::try_from(&mut *obtuse),
             ) {
-                four_geometries(t, points, first, spheres, signs, obtuse);
+                four_geometries(lanes, t, points, first, spheres, signs, obtuse);
             } else {
                 for k in 0..spheres.len() {
                     (spheres[k], signs[k], obtuse[k]) = one_geometry(t, points, TetId(first + k as u32));
@@ -110,7 +110,8 @@ impl Task for Geometries<'_> {
 }
 
 #[inline(always)]
-fn four_geometries(
+fn four_geometries<L: Lanes>(
+    lanes: L,
     t: &Triangulation,
     points: &[DVec3],
     first: u32,
@@ -126,7 +127,12 @@ fn four_geometries(
             corners[k][i] = points[v[i].index()];
         }
     }
-    let corner = |i: usize| FourVectors::new([corners[0][i], corners[1][i], corners[2][i], corners[3][i]]);
+    let corner = |i: usize| {
+        FourVectors::new(
+            lanes,
+            [corners[0][i], corners[1][i], corners[2][i], corners[3][i]],
+        )
+    };
     let a = corner(0);
     let [u, v, w] = [corner(1).sub(a), corner(2).sub(a), corner(3).sub(a)];
     let (uu, vv, ww) = (u.dot(u), v.dot(v), w.dot(w));
@@ -138,15 +144,19 @@ fn four_geometries(
     let lengths = lu + lv + lw;
     let reach = volume * lengths;
     let [b, c, d] = [m.dot(vw), m.dot(wu), m.dot(uv)];
-    let weights = [Four::all(2.0) * det * det - (b + c + d), b, c, d];
+    let weights = [Four::all(lanes, 2.0) * det * det - (b + c + d), b, c, d];
     let faces = [lv * lw, lw * lu, lu * lv];
     let bounds = [
-        Four::all(4.0) * volume * volume + reach * (faces[0] + faces[1] + faces[2]),
+        Four::all(lanes, 4.0) * volume * volume + reach * (faces[0] + faces[1] + faces[2]),
         reach * faces[0],
         reach * faces[1],
         reach * faces[2],
     ];
-    let (error, underflow, zero) = (Four::all(ERROR), Four::all(UNDERFLOW), Four::all(0.0));
+    let (error, underflow, zero) = (
+        Four::all(lanes, ERROR),
+        Four::all(lanes, UNDERFLOW),
+        Four::all(lanes, 0.0),
+    );
     // Bit k: everything about tetrahedron k is certain.
     let mut certain = 15;
     let mut outside = [0u8; 4];
@@ -170,10 +180,11 @@ fn four_geometries(
             }
         }
     }
-    let (offset, well) = offsets(m, det, volume, lengths);
+    let (offset, well) = offsets(lanes, m, det, volume, lengths);
     certain &= well;
     let centre = a.add(offset);
-    let radius = offset.dot(offset).sqrt();
+    let radius = offset.dot(offset).sqrt().array();
+    let [x, y, z] = [centre.x, centre.y, centre.z].map(Four::array);
     for k in 0..4 {
         let tet = TetId(first + k as u32);
         if certain >> k & 1 == 0 {
@@ -181,10 +192,10 @@ fn four_geometries(
             continue;
         }
         spheres[k] = Sphere {
-            centre: centre.get(k),
-            radius: radius.0[k],
+            centre: DVec3::new(x[k], y[k], z[k]),
+            radius: radius[k],
         };
-        signs[k] = Signs::new(radius.0[k], outside[k]);
+        signs[k] = Signs::new(radius[k], outside[k]);
         obtuse_out[k] = obtuse[k];
     }
 }
@@ -192,11 +203,17 @@ fn four_geometries(
 /// The offsets of four centres from their first corners as [`circumsphere::tetrahedron_from`] has them, and which of them
 /// it would leave to the exact solve (their bits are clear).
 #[inline(always)]
-fn offsets(m: FourVectors, det: Four, volume: Four, lengths: Four) -> (FourVectors, u8) {
-    let least = Four::all(circumsphere::WELL_CONDITIONED) * volume;
+fn offsets<L: Lanes>(
+    lanes: L,
+    m: FourVectors<L>,
+    det: Four<L>,
+    volume: Four<L>,
+    lengths: Four<L>,
+) -> (FourVectors<L>, u8) {
+    let least = Four::all(lanes, circumsphere::WELL_CONDITIONED) * volume;
     let reach = least * lengths;
     let well = det.abs().larger(least) & m.dot(m).larger(reach * reach);
-    (m.scale(Four::all(0.5).over(det)), well)
+    (m.scale(Four::all(lanes, 0.5) / det), well)
 }
 
 /// Geometry of one finite tetrahedron.
