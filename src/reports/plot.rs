@@ -106,7 +106,7 @@ pub fn pretty(x: f64) -> String {
         let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
         let digits = digits.trim_end_matches('0').trim_end_matches('.');
         // No line may break inside a number.
-        return format!("{digits}\u{a0}×\u{a0}10{}", superscript(power));
+        return format!("{digits}×10{}", superscript(power));
     }
     let decimals = if a >= 999.5 {
         0
@@ -487,8 +487,8 @@ mod tests {
             (0.012345, "0.0123"),
             (-2.5, "-2.5"),
             (100.0, "100"),
-            (1.39e-5, "1.39\u{a0}×\u{a0}10⁻⁵"),
-            (-2e-17, "-2\u{a0}×\u{a0}10⁻¹⁷"),
+            (1.39e-5, "1.39×10⁻⁵"),
+            (-2e-17, "-2×10⁻¹⁷"),
             (f64::NAN, "-"),
         ] {
             assert_eq!(pretty(x), text);
