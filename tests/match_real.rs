@@ -5,10 +5,14 @@ mod support;
 
 use datasets_synthetic::{rigid, sample_uniform};
 use glam::{DMat3, DVec3};
+use matchers::pose::fit_rigid;
 use medial_scaffold::geometry::{Rigid, TriangleMesh};
-use medial_scaffold::input::{Geometry, PointCloud, ReadSettings, Shape, Units, read_shape};
+use medial_scaffold::input::{
+    Geometry, PointCloud, ReadSettings, RepairSettings, Shape, Units, read_shape, repair,
+};
 use medial_scaffold::pipeline::{MatchRun, MatchSettings, match_shapes};
 use medial_scaffold::registration::Mirror;
+use nalgebra::Point3;
 use std::path::{Path, PathBuf};
 use support::{real_data, slow};
 
@@ -182,4 +186,53 @@ fn left_and_right_are_found_to_be_mirror_images() {
         );
         assert!(done.registration.mirrored, "{bone}");
     }
+}
+
+/// The markers of a Slicer markups file, LPS mm.
+fn landmarks(path: &Path) -> Vec<DVec3> {
+    let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    let file: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    file["markups"][0]["controlPoints"]
+        .as_array()
+        .expect("markers")
+        .iter()
+        .map(|p| DVec3::from_array([0, 1, 2].map(|k| p["position"][k].as_f64().expect("a number"))))
+        .collect()
+}
+
+/// Two individuals, 51 landmarks set by hand on each: no pose can lay them closer than their own best rigid fit.
+#[test]
+fn two_skulls_are_laid_together_as_their_landmarks_are() {
+    if !slow() {
+        return;
+    }
+    let Some(data) = real_data() else { return };
+    let folder = data.join("mouse_skull_localonly");
+    let skull = |name: &str| {
+        let mut shape = read(&folder.join(format!("{name}.ply")), Units::Mm);
+        let repaired = repair(mesh(&shape), &RepairSettings::default());
+        shape.geometry = Geometry::Mesh(repaired.mesh);
+        (shape, landmarks(&folder.join(format!("{name}.mrk.json"))))
+    };
+    let ((target, target_marks), (source, source_marks)) = (skull("A_J"), skull("BALB_CJ"));
+    let done = matched(&target, &source, Mirror::No);
+    assert!(!done.registration.ambiguous);
+    let rms = |motion: &dyn Fn(DVec3) -> DVec3| {
+        let squares = target_marks
+            .iter()
+            .zip(&source_marks)
+            .map(|(t, &s)| (motion(s) - *t).length_squared());
+        (squares.sum::<f64>() / target_marks.len() as f64).sqrt()
+    };
+    let points =
+        |marks: &[DVec3]| -> Vec<Point3<f64>> { marks.iter().map(|p| Point3::new(p.x, p.y, p.z)).collect() };
+    let weights = vec![1.0; target_marks.len()];
+    let best = fit_rigid(&points(&source_marks), &points(&target_marks), &weights).expect("landmarks");
+    let [given, ours, least] = [
+        rms(&|p| p),
+        rms(&|p| done.registration.T_target_source.apply(p)),
+        rms(&|p| DVec3::from_slice(best.apply(&Point3::new(p.x, p.y, p.z)).coords.as_slice())),
+    ];
+    println!("landmarks: as given {given:.3}, matched {ours:.3}, their own best fit {least:.3} mm");
+    assert!(ours < 1.2 * least && ours < given);
 }
