@@ -81,7 +81,7 @@ pub fn delaunay(points: &[DVec3], settings: &DelaunaySettings) -> Result<Triangu
         Site::new(p, p[longest])
     }));
     indices.par_extend(order.par_iter());
-    let ends = order.ends;
+    let ends = order.into_ends();
     drop(normalised);
     let first = match first_simplex(&sites) {
         Simplex::Tetrahedron(first) => first,

@@ -23,7 +23,7 @@ pub(super) struct InsertionOrder {
     /// Round, position on the curve, index, from the highest bit down.
     keys: Vec<u64>,
     /// End of each round.
-    pub ends: Vec<u32>,
+    ends: Vec<u32>,
     index_bits: u32,
 }
 
@@ -60,6 +60,11 @@ pub(super) fn insertion_order(points: &[DVec3], bounds: [DVec3; 2]) -> Insertion
 }
 
 impl InsertionOrder {
+    /// Where each round ends; the keys have served.
+    pub(super) fn into_ends(self) -> Vec<u32> {
+        self.ends
+    }
+
     /// Indices of the points in insertion order.
     pub(super) fn par_iter(&self) -> impl IndexedParallelIterator<Item = u32> + '_ {
         let index = (1 << self.index_bits) - 1;

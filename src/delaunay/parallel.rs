@@ -29,6 +29,7 @@
 //! All shared words are atomic because the language cannot see this; on common processors a relaxed load or store is a plain
 //! one. Which points wait decides the numbering only: the set of tetrahedra is canonical.
 
+use super::canonical::zeros;
 use super::filter::Filter;
 use super::insertion::{Inserter, Memory};
 use super::lanes::{Lanes, Site, Task, with_lanes};
@@ -462,7 +463,7 @@ fn share(plain: Plain, room: usize) -> Shared {
         all[..used].copy_from_slice(&words);
         all.into_iter().map(|w| w.map(AtomicU32::new)).collect()
     };
-    let mut stamps = vec![UNUSED; room.max(used)];
+    let mut stamps: Vec<u16> = zeros(room.max(used));
     stamps[..used].fill(BEFORE);
     Shared {
         vertices: atomic(plain.vertices),

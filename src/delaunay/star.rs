@@ -5,6 +5,7 @@
 //! indexed by the numbers of an edge's two ends, tells which tetrahedron has the edge (Marot, Pellerin & Remacle 2019, "One
 //! machine, one minute, three billion tetrahedra"). Stars too large for the table are linked by sorting their edges.
 
+use super::canonical::zeros;
 use super::insertion::{INF, Memory};
 use super::store::Store;
 
@@ -36,7 +37,7 @@ impl Links {
     /// For `points` vertices.
     pub(super) fn new(points: usize) -> Self {
         Self {
-            numbers: vec![0; points + 1],
+            numbers: zeros(points + 1),
             star: 0,
             table: vec![0; TABLE * TABLE],
             local: vec![[0; 4]; 2 * TABLE],
