@@ -63,6 +63,11 @@ pub struct DelaunaySettings {
 /// # Ok::<(), medial_scaffold::delaunay::DelaunayError>(())
 /// ```
 pub fn delaunay(points: &[DVec3], settings: &DelaunaySettings) -> Result<Triangulation, DelaunayError> {
+    // Inside the pool from here on: its parallel steps are many, and each would hand over to it and wait.
+    rayon::scope(|_| triangulate(points, settings))
+}
+
+fn triangulate(points: &[DVec3], settings: &DelaunaySettings) -> Result<Triangulation, DelaunayError> {
     let points = door::distinct(points)?;
     let frame = Frame::of(&points)?;
     let bounds = bounds(&points).map(|p| frame.apply(p));

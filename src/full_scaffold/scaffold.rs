@@ -221,6 +221,11 @@ impl FullScaffold {
 /// # Ok::<(), medial_scaffold::delaunay::DelaunayError>(())
 /// ```
 pub fn full_scaffold(t: &Triangulation) -> Result<FullScaffold, DelaunayError> {
+    // Inside the pool from here on: its parallel steps are many, and each would hand over to it and wait.
+    rayon::scope(|_| read_off(t))
+}
+
+fn read_off(t: &Triangulation) -> Result<FullScaffold, DelaunayError> {
     let frame = Frame::of(&t.points)?;
     let points: Cow<[DVec3]> = if frame.exponent == 0 {
         Cow::Borrowed(&t.points)
