@@ -52,20 +52,22 @@ fn settings(tolerance: Length) -> RegulariseSettings {
 /// Counts of analytic shapes at three densities.
 fn analytic_table(names: &[String]) -> Result<(), Box<dyn Error>> {
     println!(
-        "| shape | points | seed | sheets | axial | ribs | wires | nodes | Betti = solid's | fidelity / tolerance |"
+        "| shape | tolerance, % of diagonal | points | seed | sheets | axial | ribs | wires | nodes | Betti = solid's | fidelity / tolerance |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|---|");
-    for (name, seeds) in [
-        ("box", 5),
-        ("prism", 5),
-        ("l", 2),
-        ("slab", 2),
-        ("ellipsoid", 2),
-        ("torus", 2),
-        ("y", 2),
-        ("hollow", 2),
-        ("dumbbell", 2),
-        ("genus5", 1),
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    for (name, seeds, percent) in [
+        ("box", 5, 1.0),
+        ("prism", 5, 1.0),
+        ("l", 2, 1.0),
+        ("slab", 2, 0.5),
+        ("slab", 2, 1.0),
+        ("slab", 2, 1.5),
+        ("ellipsoid", 2, 1.0),
+        ("torus", 2, 1.0),
+        ("y", 2, 1.0),
+        ("hollow", 2, 1.0),
+        ("dumbbell", 2, 1.0),
+        ("genus5", 1, 1.0),
     ] {
         if !names.is_empty() && !names.iter().any(|n| n == name) {
             continue;
@@ -75,10 +77,10 @@ fn analytic_table(names: &[String]) -> Result<(), Box<dyn Error>> {
         for n in [5_000, 10_000, 20_000] {
             for seed in 1..=seeds {
                 let points = shape.sample_poisson(n, seed).points;
-                let r = run(&points, &mesh, &settings(Length::PercentDiagonal(1.0)))?;
+                let r = run(&points, &mesh, &settings(Length::PercentDiagonal(percent)))?;
                 let truth = shape.truth.solid_betti.map(|b| b.map(i64::from));
                 println!(
-                    "| {name} | {n} | {seed} | {} | {} | {} | {} | {} | {} | {:.2} |",
+                    "| {name} | {percent} | {n} | {seed} | {} | {} | {} | {} | {} | {} | {:.2} |",
                     r.coarse.sheets.len(),
                     r.count(CurveKind::Axial),
                     r.count(CurveKind::Rib),

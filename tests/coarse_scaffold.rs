@@ -10,6 +10,11 @@ use medial_scaffold::regularise::{RegulariseSettings, regularise};
 use medial_scaffold::segregation::{KnownSurfaceSettings, segregate_known_refined};
 
 fn scaffold(shape: &shapes::Shape, n: usize, seed: u64) -> CoarseScaffold {
+    scaffold_at(shape, n, seed, 1.0)
+}
+
+/// At a tolerance in % of the diagonal.
+fn scaffold_at(shape: &shapes::Shape, n: usize, seed: u64, percent: f64) -> CoarseScaffold {
     let mesh = shape.mesh(20_000);
     let surface = TriangleMesh {
         points: mesh.points,
@@ -25,7 +30,7 @@ fn scaffold(shape: &shapes::Shape, n: usize, seed: u64) -> CoarseScaffold {
     )
     .expect("an inside");
     let settings = RegulariseSettings {
-        tolerance: Length::PercentDiagonal(1.0),
+        tolerance: Length::PercentDiagonal(percent),
         ..RegulariseSettings::default()
     };
     let regularised = regularise(&fine, &settings).expect("topology is kept");
@@ -49,6 +54,11 @@ fn counts(s: &CoarseScaffold) -> [usize; 5] {
 fn check_references(s: &CoarseScaffold) {
     for (i, n) in s.nodes.iter().enumerate() {
         assert_eq!(n.id.index(), i);
+        // No node in the middle of a rib.
+        if let [a, b] = n.curves[..] {
+            let [a, b] = [a, b].map(|c| &s.curves[c.index()]);
+            assert!(a.kind != CurveKind::Rib || b.kind != CurveKind::Rib || a.sheets != b.sheets);
+        }
         for c in &n.curves {
             assert!(s.curves[c.index()].nodes.contains(&n.id));
         }
@@ -86,6 +96,10 @@ fn box_and_prism_have_the_counts_derived_by_hand() {
         let s = scaffold(&shapes::box_shape(1.0, 1.4, 2.0), 5000, seed);
         assert_eq!(counts(&s), [13, 12, 12, 0, 12]);
     }
+    // What a hidden axial curve's seam was shrunk to lies on a rib.
+    let p = scaffold(&shapes::prism(1.0, 1.5), 5000, 2);
+    assert_eq!(counts(&p), [9, 7, 9, 0, 8]);
+    check_references(&p);
 }
 
 #[test]
@@ -111,9 +125,12 @@ fn concave_edges_and_corners_held_by_a_single_ball_make_no_elements() {
     let l = scaffold(&shapes::l_block(2.0, 0.8, 0.5), 10_000, 2);
     assert_eq!(counts(&l), [16, 15, 15, 0, 15]);
     check_references(&l);
-    let slab = scaffold(&shapes::slab(0.3), 10_000, 2);
-    assert_eq!(counts(&slab), [1, 0, 1, 0, 0]);
-    check_references(&slab);
+    // One sheet for certain from 1.5 % of the diagonal on: see the derivation at `slab`.
+    for (n, seed) in [(5000, 1), (10_000, 2)] {
+        let slab = scaffold_at(&shapes::slab(0.3), n, seed, 1.5);
+        assert_eq!(counts(&slab), [1, 0, 1, 0, 0]);
+        check_references(&slab);
+    }
 }
 
 #[test]

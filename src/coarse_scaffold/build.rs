@@ -7,12 +7,14 @@
 //!    wire the largest ET of its vertices, of a rib that of its sheet, of a seam that of the axial curve it goes on from.
 //!    What no fire reaches (closed sheets, wires between other elements) cannot go at any price: it gets the diagonal;
 //! 3. [`super::ribs`]: ribs smoothed and fitted; attributes: polylines, lengths, areas, radii, moments, meshes;
-//! 4. the generator map: the sheet that most of a generator's Voronoi facets by area belong to, else what holds the nearest ball.
+//! 4. [`super::dissolve`]: nodes where only two ribs, or two pieces of one axial curve, are left go;
+//! 5. the generator map: the sheet that most of a generator's Voronoi facets by area belong to, else what holds the nearest ball.
 //!
 //! Cost `O(n log n)`.
 
 use super::attributes;
 use super::contract::{contract, thickest};
+use super::dissolve::dissolve;
 use super::generators::generator_hosts;
 use super::hypergraph::{CoarseScaffold, Curve, CurveKind, FineLinks, MedialPoint, Node, NodeKind, Sheet};
 use super::natural::natural_tolerances;
@@ -112,6 +114,9 @@ pub fn coarse_scaffold(
             curve(chain, i, sheets, persistence, &node_of_vertex, line)
         })
         .collect();
+    let mut curve_edges: Vec<Vec<u32>> = chains.into_iter().map(|c| c.edges).collect();
+    let number = dissolve(&mut curves, &mut curve_edges, node_points.len());
+    let (node_points, node_vertices) = left(&number, node_points, node_vertices, &mut node_of_vertex);
     let mut nodes = nodes(&node_points, &curves);
     seam_persistence(&mut curves, &nodes);
     for node in &mut nodes {
@@ -125,7 +130,7 @@ pub fn coarse_scaffold(
     attributes::boundaries(&mut sheets, &curves);
     let links = FineLinks {
         node_vertices,
-        curve_edges: chains.into_iter().map(|c| c.edges).collect(),
+        curve_edges,
         sheet_facets,
         generator_host: Vec::new(),
     };
@@ -144,6 +149,24 @@ pub fn coarse_scaffold(
             ..links
         },
     }
+}
+
+/// The nodes that have a number still, in its order; `node_of_vertex` follows.
+fn left(
+    number: &[Option<NodeId>],
+    points: Vec<MedialPoint>,
+    vertices: Vec<Vec<u32>>,
+    node_of_vertex: &mut [u32],
+) -> (Vec<MedialPoint>, Vec<Vec<u32>>) {
+    for n in node_of_vertex.iter_mut().filter(|n| **n != NONE) {
+        *n = number[*n as usize].map_or(NONE, |id| id.0);
+    }
+    points
+        .into_iter()
+        .zip(vertices)
+        .zip(number)
+        .filter_map(|(kept, number)| number.is_some().then_some(kept))
+        .unzip()
 }
 
 /// Largest value, capped at `never`.

@@ -55,6 +55,10 @@ pub(crate) fn generator_hosts(
             if host != Host::Absent {
                 return host;
             }
+            let known = regularised.nearest_vertex.get(g).copied();
+            if let Some(v) = known.filter(|&v| v != NONE) {
+                return of_vertex[v as usize];
+            }
             tree.nearest(fine.generator_position[g], None, |_| true)
                 .map_or(Host::Absent, |ball| of_vertex[ball.id as usize])
         })

@@ -13,6 +13,7 @@
 
 use super::attributes::{boundaries, principal};
 use super::build::{node_kind, node_persistence};
+use super::dissolve::join_curves;
 use super::hypergraph::{CoarseScaffold, Curve, CurveKind, FineLinks, Node, Sheet};
 use super::natural::natural_tolerances;
 use crate::geometry::mesh::DisjointSets;
@@ -52,7 +53,7 @@ impl CoarseScaffold {
                 ..c.clone()
             })
             .collect();
-        join_curves(&mut curves, self.nodes.len());
+        join_curves(&mut curves, &mut Vec::new(), self.nodes.len(), |_, _| true);
         let nodes = renumber(&mut curves, &self.nodes, &self.curves, sheets.is_empty());
         boundaries(&mut sheets, &curves);
         CoarseScaffold {
@@ -202,60 +203,6 @@ fn union_of(sheets: &[&Sheet]) -> Sheet {
             .extend(s.mesh.triangles.iter().map(|t| t.map(|i| i + base)));
     }
     out
-}
-
-/// Joins curves of one kind at nodes where nothing else ends.
-fn join_curves(curves: &mut Vec<Curve>, nodes: usize) {
-    let mut at: Vec<Vec<usize>> = vec![Vec::new(); nodes];
-    for (i, c) in curves.iter().enumerate() {
-        for n in &c.nodes {
-            at[n.index()].push(i);
-        }
-    }
-    let mut gone = vec![false; curves.len()];
-    for n in 0..nodes {
-        let &[a, b] = at[n].as_slice() else { continue };
-        let node = NodeId::from_index(n);
-        if curves[a].kind != curves[b].kind {
-            continue;
-        }
-        if a == b {
-            // A loop through a node that nothing else ends at: a closed curve without nodes.
-            let c = &mut curves[a];
-            c.nodes.clear();
-            c.closed = true;
-            if c.polyline.len() > 1 {
-                c.polyline.pop();
-            }
-            continue;
-        }
-        let second = curves[b].clone();
-        let first = &mut curves[a];
-        if first.nodes[1] != node {
-            first.nodes.reverse();
-            first.polyline.reverse();
-        }
-        let mut tail = second.polyline;
-        let mut far = second.nodes.clone();
-        if far[0] != node {
-            far.reverse();
-            tail.reverse();
-        }
-        first.polyline.extend(tail.into_iter().skip(1));
-        first.nodes[1] = far[1];
-        first.closed = first.nodes[0] == first.nodes[1];
-        first.length += second.length;
-        first.persistence = first.persistence.max(second.persistence);
-        gone[b] = true;
-        // The far end now belongs to the joined curve.
-        for slot in &mut at[far[1].index()] {
-            if *slot == b {
-                *slot = a;
-            }
-        }
-    }
-    let mut keep = gone.iter().map(|g| !g);
-    curves.retain(|_| keep.next().unwrap_or(true));
 }
 
 /// Numbers curves and the nodes they end at afresh. Without any curve or sheet a lone node (a ball) stays.

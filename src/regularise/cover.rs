@@ -124,6 +124,11 @@ impl Cover {
         }
     }
 
+    /// The last known witness of a generator; none, or one that has gone since or is too far, where it has none.
+    pub fn witness(&self, generator: usize) -> u32 {
+        self.witness[generator]
+    }
+
     /// Tolerance at a generator, mm.
     pub fn tolerance(&self, generator: usize) -> f64 {
         self.tolerance[generator]

@@ -25,12 +25,20 @@ pub struct Fidelity {
     pub max_tolerances: f64,
 }
 
-/// Distance of each generator to the union of alive balls, mm; 0 where a ball touches it, NaN for generators without any
-/// tetrahedron of the side.
-pub(crate) fn distances(complex: &Complex, cover: &Cover) -> Vec<f64> {
+/// The nearest alive ball of each generator.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Nearest {
+    /// Distance of the generator to the union of alive balls, mm; 0 where a ball touches it, NaN for generators without any
+    /// tetrahedron of the side.
+    pub distance_mm: Vec<f64>,
+    /// Vertex of that ball, where it had to be looked for.
+    pub vertex: Vec<u32>,
+}
+
+/// For each generator whether an alive vertex lies on its Voronoi cell, whose ball touches it.
+fn touched(complex: &Complex) -> Vec<bool> {
     let fine = complex.fine;
-    let n = fine.generator_position.len();
-    let mut touched = vec![false; n];
+    let mut touched = vec![false; fine.generator_position.len()];
     for (e, triangle) in fine.edge_generators.iter().enumerate() {
         let [a, b] = fine.edge_vertices[e];
         if complex.vertex_alive[a as usize] || complex.vertex_alive[b as usize] {
@@ -39,21 +47,56 @@ pub(crate) fn distances(complex: &Complex, cover: &Cover) -> Vec<f64> {
             }
         }
     }
+    touched
+}
+
+/// The balls of the alive vertices.
+pub(crate) fn alive_balls(complex: &Complex) -> BallTree {
+    let fine = complex.fine;
     let alive: Vec<u32> = (0..fine.num_vertices() as u32)
         .filter(|&v| complex.vertex_alive[v as usize])
         .collect();
-    let tree = BallTree::new(alive, &fine.vertex_position, &fine.vertex_radius);
-    (0..n)
+    BallTree::new(alive, &fine.vertex_position, &fine.vertex_radius)
+}
+
+/// The alive ball nearest to each generator, exactly.
+pub(crate) fn nearest(complex: &Complex, tree: &BallTree, cover: &Cover) -> Nearest {
+    let fine = complex.fine;
+    let touched = touched(complex);
+    let (distance_mm, vertex) = (0..touched.len())
         .into_par_iter()
         .map(|g| {
             if !cover.tolerance(g).is_finite() {
-                f64::NAN
-            } else if touched[g] {
-                0.0
-            } else {
-                tree.nearest(fine.generator_position[g], None, |_| true)
-                    .map_or(f64::INFINITY, |b| b.distance.max(0.0))
+                return (f64::NAN, NONE);
             }
+            if touched[g] {
+                return (0.0, NONE);
+            }
+            tree.nearest(fine.generator_position[g], None, |_| true)
+                .map_or((f64::INFINITY, NONE), |b| (b.distance.max(0.0), b.id))
+        })
+        .unzip();
+    Nearest { distance_mm, vertex }
+}
+
+/// The generators that no alive ball comes within the tolerance of, ascending.
+pub(crate) fn offending(complex: &Complex, tree: &BallTree, cover: &Cover) -> Vec<u32> {
+    let fine = complex.fine;
+    let touched = touched(complex);
+    (0..touched.len() as u32)
+        .into_par_iter()
+        .filter(|&g| {
+            let (point, tau) = (fine.generator_position[g as usize], cover.tolerance(g as usize));
+            let distance =
+                |v: u32| point.distance(fine.vertex_position[v as usize]) - fine.vertex_radius[v as usize];
+            // Most keep the witness they had.
+            let kept = |v: u32| v != NONE && complex.vertex_alive[v as usize] && distance(v).max(0.0) <= tau;
+            tau.is_finite()
+                && !touched[g as usize]
+                && !kept(cover.witness(g as usize))
+                && tree
+                    .nearest(point, Some(tau), |_| true)
+                    .is_none_or(|b| b.distance.max(0.0) > tau)
         })
         .collect()
 }

@@ -42,7 +42,9 @@ pub struct RegulariseSettings {
     pub slight_erosion: f64,
     /// Sheets grow back across their ribs to this erosion thickness, in tolerances.
     pub grow_back: f64,
-    /// Facets that lengthen an axial curve grow back to this erosion thickness, in tolerances.
+    /// Facets that lengthen an axial curve grow back to this erosion thickness, in tolerances. Where an axial curve fades out, its
+    /// end wanders with the sampling, the more the earlier it is cut: between two samplings of 25 bones the numbers of sheets and of axial
+    /// curves change by 17 and 9 % with 0.45, 12 and 8 % with 0.3, 9 and 8 % with 0.2, 10 and 7 % with 0.15.
     pub grow_back_axial: f64,
     /// Fingers along ribs up to twice this many tolerances wide are trimmed.
     pub fringe_width: f64,
@@ -72,7 +74,7 @@ impl Default for RegulariseSettings {
             slight_move: 0.1,
             slight_erosion: 6.0,
             grow_back: 0.15,
-            grow_back_axial: 0.3,
+            grow_back_axial: 0.15,
             fringe_width: 1.5,
             fringe_erosion: 0.5,
             rounds: 3,

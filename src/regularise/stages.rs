@@ -5,7 +5,7 @@ use super::cells::remove_cells;
 use super::collapse::{WireFire, collapse_facets};
 use super::complex::{Alive, Complex, Step};
 use super::cover::Cover;
-use super::fidelity::{self, Fidelity};
+use super::fidelity::{self, Fidelity, Nearest};
 use super::fins::trim_fins;
 use super::fringe::{Fringe, trim_fringes};
 use super::grow::{grow_sheets, grow_wires};
@@ -54,6 +54,8 @@ pub struct Regularised {
     /// The cut, in local tolerances: what is less persistent has been removed, unless the surface would have moved too far. 0
     /// when costs are not lengths.
     pub cut: f64,
+    /// Vertex of the medial ball nearest to each generator, where it had to be looked for.
+    pub(crate) nearest_vertex: Vec<u32>,
     pub(crate) local_tolerance: Tolerance,
 }
 
@@ -97,11 +99,11 @@ pub fn regularise(
     let mut cover = Cover::new(&run.complex, &run.measure, None);
     run.simplify(&mut cover);
     run.checked("splice and trim")?;
-    let distances = run.grow_within_tolerance(&cover);
+    let nearest = run.grow_within_tolerance(&cover);
     run.checked("grow back")?;
     let seams = find_seams(&run.complex, &run.measure, settings, &mut run.history);
-    let fidelity = Fidelity::of(&distances, &cover);
-    Ok(run.finish(seams, fidelity))
+    let fidelity = Fidelity::of(&nearest.distance_mm, &cover);
+    Ok(run.finish(seams, fidelity, nearest.vertex))
 }
 
 struct Run<'a> {
@@ -273,24 +275,22 @@ impl<'a> Run<'a> {
         );
     }
 
-    /// Grows back, and starts again with pieces restored while the surface has moved too far anywhere. Returns the
-    /// distances from the generators to the balls.
-    fn grow_within_tolerance(&mut self, cover: &Cover) -> Vec<f64> {
-        let offending = |distances: &[f64]| -> Vec<u32> {
-            (0..distances.len() as u32)
-                .filter(|&g| distances[g as usize] > cover.tolerance(g as usize))
-                .collect()
-        };
+    /// Grows back, and starts again with pieces restored while the surface has moved too far anywhere. Returns the balls nearest to the
+    /// generators.
+    fn grow_within_tolerance(&mut self, cover: &Cover) -> Nearest {
         for attempt in 0..=ATTEMPTS {
             let start = (self.complex.log.len(), self.history.len());
             let fire = self.fire.clone();
             if attempt < ATTEMPTS {
                 self.grow(cover, attempt == 0);
             }
-            let distances = fidelity::distances(&self.complex, cover);
-            let bad = offending(&distances);
-            if bad.is_empty() || self.settings.cost == Cost::Count {
-                return distances;
+            let tree = fidelity::alive_balls(&self.complex);
+            let bad = match self.settings.cost {
+                Cost::Length => fidelity::offending(&self.complex, &tree, cover),
+                Cost::Count => Vec::new(),
+            };
+            if bad.is_empty() {
+                return fidelity::nearest(&self.complex, &tree, cover);
             }
             self.complex.undo_to(start.0);
             self.history.truncate(start.1);
@@ -300,10 +300,11 @@ impl<'a> Run<'a> {
             });
         }
         self.grow(cover, false);
-        fidelity::distances(&self.complex, cover)
+        let tree = fidelity::alive_balls(&self.complex);
+        fidelity::nearest(&self.complex, &tree, cover)
     }
 
-    fn finish(self, seams: Vec<Vec<u32>>, fidelity: Fidelity) -> Regularised {
+    fn finish(self, seams: Vec<Vec<u32>>, fidelity: Fidelity, nearest_vertex: Vec<u32>) -> Regularised {
         let tolerance_mm = self.largest_tolerance();
         let wire_erosion_mm = (0..self.fine.num_vertices() as u32)
             .map(|v| self.fire.erosion(&self.complex, v).unwrap_or(f64::NAN))
@@ -324,6 +325,7 @@ impl<'a> Run<'a> {
                 Cost::Length => self.cut,
                 Cost::Count => 0.0,
             },
+            nearest_vertex,
             local_tolerance: self.measure.tolerance,
         }
     }

@@ -40,6 +40,8 @@ const STREAM: u64 = 1;
 struct Candidate {
     point: DVec3,
     normal: DVec3,
+    /// Squared distance to a taken sample that excludes it, the nearest when it was last looked for.
+    nearest2: f64,
 }
 
 /// `count` samples of `mesh` about `spacing_mm` apart, `taken` first and included in the count.
@@ -54,6 +56,7 @@ pub fn samples(mesh: &TriangleMesh, taken: &[DVec3], count: usize, spacing_mm: f
         .map(|&point| Candidate {
             point,
             normal: DVec3::ZERO,
+            nearest2: f64::INFINITY,
         })
         .collect();
     let mut radius = FIRST_RADIUS * spacing_mm;
@@ -64,9 +67,13 @@ pub fn samples(mesh: &TriangleMesh, taken: &[DVec3], count: usize, spacing_mm: f
     while kept.len() < count && !candidates.is_empty() {
         let radius2 = radius * radius;
         let hopeless2 = (HOPELESS * spacing_mm).powi(2).min(radius2);
-        candidates.retain(|c| {
+        candidates.retain_mut(|c| {
             if kept.len() >= count {
                 return false;
+            }
+            // Samples never go: what excluded it still does.
+            if c.nearest2 < radius2 {
+                return true;
             }
             let mut nearest2 = f64::INFINITY;
             for i in grid.near_within(c.point, radius) {
@@ -82,6 +89,7 @@ pub fn samples(mesh: &TriangleMesh, taken: &[DVec3], count: usize, spacing_mm: f
                 grid.insert(c.point, kept.len() as u32);
                 kept.push(*c);
             }
+            c.nearest2 = nearest2;
             nearest2 < radius2
         });
         radius *= SHRINK;
@@ -103,7 +111,11 @@ fn candidates(mesh: &TriangleMesh, n: usize, rng: &mut impl Rng) -> Vec<Candidat
             let (u, v): (f64, f64) = (rng.random(), rng.random());
             let s = u.sqrt();
             let point = a * (1.0 - s) + b * (s * (1.0 - v)) + c * (s * v);
-            out.push(Candidate { point, normal });
+            out.push(Candidate {
+                point,
+                normal,
+                nearest2: f64::INFINITY,
+            });
         }
     }
     out
