@@ -1,10 +1,11 @@
 //! Prints what the scaffolds alone say of real bones: how often they give the pose, and whose bone is nearest to whose.
 //!
-//! `cargo run --release --example matching_table -- [BONES] [pose] [identity] [carpals] [population]` with the bones of `../shared/data` (or of the folder
+//! `cargo run --release --example matching_table -- [BONES] [pose] [identity] [carpals] [population] [names]` with the bones of `../shared/data` (or of the folder
 //! in `MEDIAL_DATA`). `pose`: every bone against itself, sampled again (other seed, four times the points, noise of half the
 //! spacing), in a random pose. `identity`: right tarsals of one person
 //! against the mirrored left ones. `carpals`: the same for a wrist, and two persons' wrists. `population`: four (or BONES)
-//! individuals of eight synthetic carpal-like bones, whose correspondences are known.
+//! individuals of eight synthetic carpal-like bones, whose correspondences are known. `names`: whole sets of bones named one to one by
+//! their surfaces, of one person's two sides, of two persons, of a shape model's and of synthetic individuals.
 
 use datasets_synthetic::{Warp, bones as synthetic, population as synthetic_population};
 use glam::{DMat3, DQuat, DVec3};
@@ -18,7 +19,9 @@ use medial_scaffold::input::{Geometry, ReadSettings, Shape, Units, read_shape};
 use medial_scaffold::matching::{
     Matching, MatchingSettings, ShapeDistance, match_scaffolds, match_scaffolds_at,
 };
-use medial_scaffold::registration::{RegistrationSettings, RegistrationShape, register};
+use medial_scaffold::registration::{
+    Mirror, NamingSettings, RegistrationSettings, RegistrationShape, name_shapes, register,
+};
 use medial_scaffold::regularise::{RegulariseSettings, regularise};
 use medial_scaffold::segregation::{KnownSurfaceSettings, segregate_known_refined};
 use rand::SeedableRng;
@@ -55,6 +58,9 @@ fn main() {
         let all: Vec<&Bone> = right.iter().chain(&carpals).take(most).collect();
         poses(&all);
     }
+    if chosen("names") {
+        names(&data, &carpals, [&right, &left]);
+    }
     if chosen("identity") {
         let (r, l) = (named(&right, most), named(&left, most));
         identity("Tarsals of one person, right and mirrored left", &r, &l, true);
@@ -82,6 +88,61 @@ fn main() {
             &l,
             true,
         );
+    }
+}
+
+/// Sets of bones named jointly on their surfaces: one person's two sides, and several persons.
+fn names(data: &Path, carpals: &[Bone], tarsals: [&[Bone]; 2]) {
+    println!(
+        "\n| sets | nearest, without size | jointly, without size | wrong in doubt | right in doubt | nearest, with size | jointly, with size | wrong in doubt | right in doubt | size ratio | mirrored | s |"
+    );
+    println!("|{}", "---|".repeat(12));
+    let folder = data.join("carpal_myosim_apache2/lowres_rvs_lvs");
+    let (coarse_right, coarse_left): (Vec<Bone>, Vec<Bone>) = bones(&folder, Units::M)
+        .into_iter()
+        .partition(|b| b.name.ends_with("rvs"));
+    joint("carpals of two persons, right", carpals, &coarse_right);
+    joint("carpals of two persons, right and left", carpals, &coarse_left);
+    joint("one coarse wrist, right and left", &coarse_right, &coarse_left);
+    joint("tarsals of one person, right and left", tarsals[0], tarsals[1]);
+    let knees = bones(&data.join("knee_ssm_synthetic_localonly"), Units::Mm);
+    let knee = |person: &str| -> Vec<Bone> {
+        let of = knees.iter().filter(|b| b.name.starts_with(person));
+        of.map(|b| Bone {
+            name: b.name.clone(),
+            mesh: b.mesh.clone(),
+        })
+        .collect()
+    };
+    for (a, b) in [
+        ("S001", "S002"),
+        ("S001", "S003"),
+        ("S002", "S004"),
+        ("S003", "S004"),
+    ] {
+        joint(&format!("knees {a} and {b}"), &knee(a), &knee(b));
+    }
+    let person = |k: u64| -> Vec<Bone> {
+        let bone = |kind: &synthetic::Bone| {
+            let reference = synthetic::bone(*kind, 0);
+            let shape = if k == 0 {
+                reference
+            } else {
+                synthetic_population::individual(&reference, k).shape
+            };
+            let made = shape.mesh(6000);
+            Bone {
+                name: kind.name().to_owned(),
+                mesh: TriangleMesh {
+                    points: made.points,
+                    triangles: made.triangles,
+                },
+            }
+        };
+        synthetic::Bone::ALL.iter().map(bone).collect()
+    };
+    for (a, b) in [(0, 1), (0, 2), (1, 2), (1, 3), (2, 3)] {
+        joint(&format!("synthetic carpals {a} and {b}"), &person(a), &person(b));
     }
 }
 
@@ -156,19 +217,86 @@ fn poses(bones: &[&Bone]) {
 /// Bones by name with their scaffolds.
 type Named = Vec<(String, CoarseScaffold)>;
 
+fn short(name: &str) -> String {
+    let parts = [
+        "arm_r_",
+        "_rvs",
+        "_lvs",
+        "VHF_Right_Bone_",
+        "VHF_Left_Bone_",
+        "_smooth",
+    ];
+    let bare = parts.iter().fold(name.to_owned(), |n, part| n.replace(part, ""));
+    // Individuals of the shape model: S001_Femur.
+    bare.split_once('_')
+        .map_or(bare.clone(), |(_, bone)| bone.to_owned())
+}
+
+fn views(set: &[TriangleMesh]) -> Vec<RegistrationShape<'_>> {
+    set.iter().map(RegistrationShape::mesh).collect()
+}
+
+/// Names one set of bones by another on their surfaces: every bone by its nearest, with and without size, and all jointly.
+fn joint(title: &str, targets: &[Bone], sources: &[Bone]) {
+    let shapes = |set: &[Bone]| -> Vec<TriangleMesh> { set.iter().map(|b| b.mesh.clone()).collect() };
+    let (a, b) = (shapes(targets), shapes(sources));
+    let same = |i: usize, j: usize| short(&targets[i].name) == short(&sources[j].name);
+    let mut cells = Vec::new();
+    let clock = Instant::now();
+    for size_weight in [0.0, NamingSettings::default().size_weight] {
+        let settings = NamingSettings {
+            mirror: Mirror::Auto,
+            size_weight,
+            ..Default::default()
+        };
+        let found = name_shapes(&views(&a), &views(&b), &settings).expect("the meshes are sound");
+        let cost = |i: usize, j: usize| {
+            let size = size_weight * (found.size_ratios[i][j] / found.size_ratio).ln();
+            found.differences[i][j].hypot(size)
+        };
+        let least = |costs: Vec<f64>| (0..costs.len()).min_by(|&x, &y| costs[x].total_cmp(&costs[y]));
+        let of_target = (0..a.len())
+            .filter(|&i| least((0..b.len()).map(|j| cost(i, j)).collect()).is_some_and(|j| same(i, j)))
+            .count();
+        let of_source = (0..b.len())
+            .filter(|&j| least((0..a.len()).map(|i| cost(i, j)).collect()).is_some_and(|i| same(i, j)))
+            .count();
+        let right = found.pairs.iter().filter(|p| same(p.target, p.source)).count();
+        let wrong: Vec<_> = found.pairs.iter().filter(|p| !same(p.target, p.source)).collect();
+        let flagged = |w: bool| {
+            let of = found
+                .pairs
+                .iter()
+                .filter(|p| same(p.target, p.source) != w && p.ambiguous);
+            of.count()
+        };
+        let leads: Vec<f64> = found
+            .pairs
+            .iter()
+            .map(|p| (p.lead * 100.0).round() / 100.0)
+            .collect();
+        println!("<!-- {title}, weight {size_weight}: leads {leads:?} -->");
+        cells.push(format!(
+            "{}/{} | {right}/{} | {}/{} | {}/{right}",
+            of_target + of_source,
+            a.len() + b.len(),
+            found.pairs.len(),
+            flagged(true),
+            wrong.len(),
+            flagged(false),
+        ));
+        if size_weight > 0.0 {
+            cells.push(format!("{:.2} | {}", found.size_ratio, found.mirrored));
+        }
+    }
+    println!(
+        "| {title} | {} | {:.1} |",
+        cells.join(" | "),
+        clock.elapsed().as_secs_f64()
+    );
+}
+
 fn named(bones: &[Bone], most: usize) -> Named {
-    let short = |name: &str| {
-        [
-            "arm_r_",
-            "_rvs",
-            "_lvs",
-            "VHF_Right_Bone_",
-            "VHF_Left_Bone_",
-            "_smooth",
-        ]
-        .iter()
-        .fold(name.to_owned(), |n, part| n.replace(part, ""))
-    };
     let all: Vec<&Bone> = bones.iter().take(most).collect();
     all.iter()
         .filter_map(|b| Some((short(&b.name), scaffold(&b.mesh, 10_000, 1, 0.0)?)))

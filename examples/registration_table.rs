@@ -1,8 +1,9 @@
 //! Prints how often, how precisely and how fast `register` finds the pose of real bones.
 //!
-//! `cargo run --release --example registration_table -- [TRIALS] [CASE...]` with the bones of `../shared/data` (or of the folder
+//! `cargo run --release --example registration_table -- [TRIALS] [CASE...] [each] [from N]` with the bones of `../shared/data` (or of the folder
 //! in `MEDIAL_DATA`); cases: whole, crop50, crop50-low, crop50-high, overlap33, overlap20, one55, one35, one25, mesh, mirror.
 //! `... -- TRIALS dump FOLDER CASE...` writes the clouds of the trials, raw and de-noised, for `compare/registration.py`.
+//! `from N` starts with trial N instead of trial 0 (other cuts, noise and poses of the same bones);
 //! `each` prints the error of every trial as well, with the standard error that was reported.
 //! Every trial takes one bone, samples it twice independently (4 000 points as target, 2 000 as source), cuts, adds noise in
 //! percent of the whole bone's diagonal, and turns the source by a uniform random rotation.
@@ -81,6 +82,11 @@ struct Bone {
 fn main() {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let trials = args.iter().find_map(|a| a.parse().ok()).unwrap_or(20);
+    let first = args
+        .iter()
+        .position(|a| a == "from")
+        .and_then(|k| args.get(k + 1)?.parse().ok())
+        .unwrap_or(0);
     let chosen: Vec<&String> = args.iter().filter(|a| a.parse::<usize>().is_err()).collect();
     let data = std::env::var_os("MEDIAL_DATA").map_or_else(|| PathBuf::from("../shared/data"), PathBuf::from);
     let bones = read_bones(&data);
@@ -108,7 +114,7 @@ fn main() {
     println!("|---|---|---|---|---|---|---|---|---|");
     for case in &CASES {
         if chosen.is_empty() || chosen.iter().any(|c| *c == case.name) {
-            run(case, &bones, trials);
+            run(case, &bones, first, trials);
         }
     }
     if chosen.is_empty() || chosen.iter().any(|c| *c == "mesh") {
@@ -169,14 +175,14 @@ fn dump(case: &Case, bones: &[Bone], trials: usize, folder: &Path) {
     }
 }
 
-fn run(case: &Case, bones: &[Bone], trials: usize) {
+fn run(case: &Case, bones: &[Bone], first: usize, trials: usize) {
     let mut errors = Vec::new();
     // Error over standard error, of the right ones.
     let mut normed = Vec::new();
     let mut each = String::new();
     let mut seconds = Vec::new();
     let (mut wrong_flagged, mut wrong, mut right_flagged) = (0, 0, 0);
-    for trial in 0..trials {
+    for trial in first..first + trials {
         let Trial {
             bone,
             target,

@@ -3,8 +3,8 @@
 use glam::{DMat3, DVec3};
 use medial_scaffold::geometry::{Rigid, TriangleMesh};
 use medial_scaffold::registration::{
-    Method, Mirror, Registration, RegistrationError, RegistrationSettings, RegistrationShape, Surface,
-    clean_cloud, difference, register,
+    Method, Mirror, NamingSettings, Registration, RegistrationError, RegistrationSettings, RegistrationShape,
+    Surface, clean_cloud, difference, name_shapes, register,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -400,6 +400,48 @@ fn a_growth_does_not_drag_the_rest_along() {
         error_deg(&found, &motion) < 0.05,
         "{}",
         error_deg(&found, &motion)
+    );
+}
+
+#[test]
+fn a_set_names_another_of_other_size_hand_and_order() {
+    let ball = star(|d| 8.0 + 2.0 * (-(d - DVec3::X).length_squared() / 0.3).exp());
+    let targets = [lump(1.0), lump(0.4), ball];
+    let sources: Vec<TriangleMesh> = targets
+        .iter()
+        .rev()
+        .enumerate()
+        .map(|(k, mesh)| {
+            let mut mesh = mesh.clone();
+            mesh.points
+                .iter_mut()
+                .for_each(|p| *p *= DVec3::new(-1.4, 1.4, 1.4));
+            mesh.flip();
+            moved(&mesh, &motion(60 + k as u64))
+        })
+        .collect();
+    let named: Vec<_> = targets.iter().map(RegistrationShape::mesh).collect();
+    let names: Vec<_> = sources[..2].iter().map(RegistrationShape::mesh).collect();
+    let settings = NamingSettings {
+        mirror: Mirror::Auto,
+        ..Default::default()
+    };
+    let found = name_shapes(&named, &names, &settings).expect("sound meshes");
+    let pairs: Vec<_> = found.pairs.iter().map(|p| (p.target, p.source)).collect();
+    assert_eq!(pairs, [(1, 1), (2, 0)]);
+    assert_eq!(
+        (found.unnamed_targets.as_slice(), found.unnamed_sources.len()),
+        ([0].as_slice(), 0)
+    );
+    assert!(
+        found.mirrored && (found.size_ratio - 1.4).abs() < 0.02,
+        "{}",
+        found.size_ratio
+    );
+    assert!(
+        found.pairs.iter().all(|p| p.difference < 0.02),
+        "{:?}",
+        found.pairs
     );
 }
 

@@ -21,18 +21,23 @@ use std::path::{Path, PathBuf};
 /// Arguments of `medial match`.
 #[derive(Debug, Args)]
 pub struct MatchArgs {
-    /// The shape that stays.
-    target: PathBuf,
+    /// The shape that stays; with --names a folder of shapes.
+    pub(super) target: PathBuf,
 
-    /// The shape that is moved.
-    source: PathBuf,
+    /// The shape that is moved; with --names a folder of shapes.
+    pub(super) source: PathBuf,
 
     /// Output directory.
     #[arg(short, long, value_name = "DIR")]
-    output: Option<PathBuf>,
+    pub(super) output: Option<PathBuf>,
+
+    /// TARGET and SOURCE are folders: say which shape of one is which of the other, one to one, whatever their names, poses and sizes
+    /// (the bones of two wrists). Writes names.json and names.csv.
+    #[arg(long, conflicts_with_all = ["scale", "extent"])]
+    names: bool,
 
     #[command(flatten)]
-    options: MatchOptions,
+    pub(super) options: MatchOptions,
 }
 
 /// How shapes are matched.
@@ -99,6 +104,9 @@ pub fn run(args: &MatchArgs, common: &Common) -> Result<Verdict, Failure> {
         return Err(Failure::usage(
             "nowhere to put the result; give an output directory with -o DIR, or --json",
         ));
+    }
+    if args.names {
+        return super::names::run(args, common);
     }
     let target = common.read(&args.target)?;
     let source = common.read(&args.source)?;

@@ -13,6 +13,7 @@ mod check;
 mod demo;
 mod match_command;
 mod mesh;
+mod names;
 mod report;
 mod scaffold;
 mod synth;

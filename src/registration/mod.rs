@@ -20,6 +20,7 @@
 //! | `significance` | whether one whole pose is better than another by more than the shapes differ |
 //! | `precision` | how precisely the pose is known |
 //! | `verdict` | which pose is reported and what is said of it |
+//! | [`naming`] | which shape of one set is which of another |
 //! | [`difference`](mod@difference) | what is left between the shapes in that pose |
 //!
 //! Everything is seeded; parallel parts keep their order, so results are equal for any number of threads.
@@ -30,6 +31,7 @@ pub mod difference;
 mod exact;
 mod faces;
 mod isolated;
+pub mod naming;
 mod nearest_grid;
 mod oriented;
 mod pairs;
@@ -48,6 +50,7 @@ mod walls;
 
 pub use denoise::{CleanCloud, clean_cloud};
 pub use difference::{Difference, SheetContext, SheetDifference, difference};
+pub use naming::{NamedPair, Naming, NamingSettings, name_shapes};
 pub use result::{Conditioning, Hypothesis, Method, Precision, Registration, SlidingDirection};
 pub use settings::{Extent, Mirror, RegistrationSettings};
 pub use shape::{RegistrationError, RegistrationShape, Surface};
