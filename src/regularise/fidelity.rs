@@ -5,7 +5,7 @@
 //! vertex whose return costs least is brought back together with everything it hangs on: a removal can be reversed as
 //! soon as what was removed after it on its faces is back, so following the log forward from it gives elementary expansions only.
 
-use super::balls::BallTree;
+use super::balls::{BallTree, near_order};
 use super::complex::{Complex, Step};
 use super::cover::Cover;
 use crate::fine_scaffold::complex::NONE;
@@ -63,9 +63,11 @@ pub(crate) fn alive_balls(complex: &Complex) -> BallTree {
 pub(crate) fn nearest(complex: &Complex, tree: &BallTree, cover: &Cover) -> Nearest {
     let fine = complex.fine;
     let touched = touched(complex);
-    let (distance_mm, vertex) = (0..touched.len())
-        .into_par_iter()
-        .map(|g| {
+    let order = near_order(&fine.generator_position);
+    let found: Vec<(f64, u32)> = order
+        .par_iter()
+        .map(|&g| {
+            let g = g as usize;
             if !cover.tolerance(g).is_finite() {
                 return (f64::NAN, NONE);
             }
@@ -75,8 +77,16 @@ pub(crate) fn nearest(complex: &Complex, tree: &BallTree, cover: &Cover) -> Near
             tree.nearest(fine.generator_position[g], None, |_| true)
                 .map_or((f64::INFINITY, NONE), |b| (b.distance.max(0.0), b.id))
         })
-        .unzip();
-    Nearest { distance_mm, vertex }
+        .collect();
+    let mut out = Nearest {
+        distance_mm: vec![f64::NAN; order.len()],
+        vertex: vec![NONE; order.len()],
+    };
+    for (g, (distance_mm, vertex)) in order.into_iter().zip(found) {
+        out.distance_mm[g as usize] = distance_mm;
+        out.vertex[g as usize] = vertex;
+    }
+    out
 }
 
 /// The generators that no alive ball comes within the tolerance of, ascending.
