@@ -233,18 +233,22 @@ impl Worker<'_> {
     #[inline(never)]
     fn claims(&self, tet: u32) -> bool {
         let stamp = &self.shared.stamps[tet as usize];
-        let last = stamp.load(Relaxed);
-        if last == UNUSED || last >= self.pass {
-            return false;
-        }
-        let owner = self.owner(self.tet(tet));
-        // Vertices written by another thread in this pass come with its stamp, by now.
+        let first = stamp.load(Relaxed);
+        let vertices = self.tet(tet);
+        // Vertices written by another thread in this pass come with its stamp, by the second look.
         fence(Ordering::Acquire);
-        if owner != self.number || stamp.load(Relaxed) != last {
-            return false;
+        let second = stamp.load(Relaxed);
+        let own = self.is_own([first, second], vertices);
+        if own {
+            self.stamp(tet);
         }
-        self.stamp(tet);
-        true
+        own
+    }
+
+    /// Whether a slot whose stamp was the same before and after its vertices were read is this thread's.
+    #[inline(always)]
+    fn is_own(&self, [first, second]: [u16; 2], vertices: [u32; 4]) -> bool {
+        first != UNUSED && first < self.pass && first == second && self.owner(vertices) == self.number
     }
 
     /// Stamps a slot, before anything in it is changed.
@@ -490,5 +494,102 @@ fn unshare(shared: Shared, free: Vec<u32>) -> Plain {
         vertices,
         neighbours: plain(shared.neighbours),
         free,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    /// Calls `f` with all ways to put two sequences of steps into one: `true` for a step of the first.
+    fn interleavings(first: usize, second: usize, so_far: &mut Vec<bool>, f: &mut impl FnMut(&[bool])) {
+        if first + second == 0 {
+            f(so_far);
+        }
+        for (of_first, left) in [(true, first), (false, second)] {
+            if left > 0 {
+                so_far.push(of_first);
+                interleavings(
+                    first - usize::from(of_first),
+                    second - usize::from(!of_first),
+                    so_far,
+                    f,
+                );
+                so_far.pop();
+            }
+        }
+    }
+
+    /// One thread stamps its slot and changes it, in any order of its words, while another looks at it as
+    /// [`Worker::claims`] does: in every order of their steps, and whatever the slot held and will hold, the other leaves it
+    /// alone. Without the second look at the stamp it would not.
+    #[test]
+    fn nobody_claims_what_its_owner_changes() {
+        const PASS: u16 = 3;
+        let sites: Vec<Site> = (0..4u8).map(|i| Site::new(DVec3::ZERO, f64::from(i))).collect();
+        let shared = share(Plain::default(), 1);
+        let map = Map::one_each(vec![2.0]);
+        let infinite = u32::MAX;
+        let contents = [
+            [0, 1, 2, 3],
+            [3, 2, 1, 0],
+            [2, 3, 0, infinite],
+            [3, 1, 2, infinite],
+            [2, 3, 3, 2],
+            [3, 2, 2, infinite],
+            NOTHING,
+        ];
+        let (mut fooled, mut ways) = (0, 0);
+        for number in [0, 1] {
+            let (mut own_slots, mut other_slots) = (Slots::default(), Slots::default());
+            let of = |number: u16, slots| Worker {
+                shared: &shared,
+                sites: &sites,
+                map: &map,
+                slots,
+                number,
+                pass: PASS,
+                stamp: PASS + number,
+            };
+            let (owner, other) = (of(number, &mut own_slots), of(1 - number, &mut other_slots));
+            let owned = |v: &&[u32; 4]| owner.owner(**v) == number;
+            for old in contents.iter().filter(owned) {
+                assert!(owner.is_own([BEFORE; 2], *old) && !other.is_own([BEFORE; 2], *old));
+                // What an owner writes is its own or nothing.
+                for new in contents.iter().filter(|v| **v == NOTHING || owned(v)) {
+                    for turn in 0..4 {
+                        interleavings(5, 6, &mut Vec::new(), &mut |order| {
+                            let (mut stamp, mut words) = (BEFORE, *old);
+                            let (mut written, mut read) = (0, 0);
+                            let (mut stamps, mut vertices) = ([0; 2], [0; 4]);
+                            for &by_owner in order {
+                                if by_owner {
+                                    match written {
+                                        0 => stamp = owner.stamp,
+                                        k => words[(k + turn) % 4] = new[(k + turn) % 4],
+                                    }
+                                    written += 1;
+                                } else {
+                                    match read {
+                                        0 => stamps[0] = stamp,
+                                        5 => stamps[1] = stamp,
+                                        k => vertices[k - 1] = words[k - 1],
+                                    }
+                                    read += 1;
+                                }
+                            }
+                            assert!(!other.is_own(stamps, vertices), "{old:?} {new:?} {order:?}");
+                            fooled += u32::from(other.is_own([stamps[0]; 2], vertices));
+                            ways += 1;
+                        });
+                    }
+                }
+            }
+        }
+        assert!(
+            fooled > 0 && ways > 10_000,
+            "one look is fooled {fooled} times of {ways}"
+        );
     }
 }

@@ -21,15 +21,19 @@ pub struct DegenerateVertex {
 pub(super) fn degenerate_vertices(t: &Triangulation, scaffold: &FullScaffold) -> Vec<DegenerateVertex> {
     let tied = |tet: TetId| (0..4u8).any(|index| scaffold.is_zero_length(Facet { tet, index }));
     let tets: Vec<TetId> = t.finite_tets().filter(|&tet| tied(tet)).collect();
-    let place = |tet: TetId| tets.binary_search(&tet).map(|i| i as u32);
+    if tets.is_empty() {
+        return Vec::new();
+    }
+    let mut place = vec![u32::MAX; t.num_finite()];
+    for (i, tet) in (0..).zip(&tets) {
+        place[tet.index()] = i;
+    }
     let mut sets = DisjointSets::new(tets.len());
     for (i, &tet) in tets.iter().enumerate() {
         for index in 0..4u8 {
             let facet = Facet { tet, index };
-            if scaffold.is_zero_length(facet)
-                && let Ok(j) = place(t.neighbour(tet, index as usize))
-            {
-                sets.union(i as u32, j);
+            if scaffold.is_zero_length(facet) {
+                sets.union(i as u32, place[t.neighbour(tet, index as usize).index()]);
             }
         }
     }

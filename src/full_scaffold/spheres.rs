@@ -17,7 +17,7 @@ use crate::geometry::TetId;
 use crate::geometry::circumsphere::{self, Sphere};
 use crate::geometry::fixed::Grid;
 use crate::geometry::predicates::{
-    EPSILON, UNDERFLOW, edge_gabriel_perturbed, insphere, tri_gabriel_perturbed,
+    EPSILON, UNDERFLOW, edge_gabriel_perturbed, exact_on_lattice, insphere, tri_gabriel_perturbed,
 };
 use glam::DVec3;
 use std::ops::{Add, Sub};
@@ -274,11 +274,16 @@ pub(super) fn cospherical(grid: Grid, corners: [DVec3; 4], p: DVec3) -> bool {
     let volume = lu * lv * lw;
     let power = q.dot(m) - qq * u.dot(vw);
     let bound = ERROR * volume * (lq * (lu + lv + lw) + qq) + UNDERFLOW;
-    power.abs() <= bound
-        && grid
-            .insphere(a, b, c, d, p)
-            .unwrap_or_else(|| insphere(a, b, c, d, p))
-            == 0.0
+    if power.abs() > bound {
+        return false;
+    }
+    // Of degree five, with fewer than 2^7 terms.
+    if exact_on_lattice(&[(b, a, u), (c, a, v), (d, a, w), (p, a, q)], 9) {
+        return power == 0.0;
+    }
+    grid.insphere(a, b, c, d, p)
+        .unwrap_or_else(|| insphere(a, b, c, d, p))
+        == 0.0
 }
 
 /// [`Geometries::obtuse`] for all four facets. With `S` the sum of the three squares every cosine term below is a sum of

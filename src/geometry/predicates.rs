@@ -185,7 +185,7 @@ pub fn tri_gabriel(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> f64 {
 /// Whether the differences `d = p - q` are exact and are multiples of one unit, at most `2^bits` of it: a polynomial of degree
 /// `n` and with few terms is then exact in plain arithmetic as long as `n * bits` stays well below 53. The case of lattices.
 #[inline(never)]
-fn exact_on_lattice(differences: &[(DVec3, DVec3, DVec3)], bits: i32) -> bool {
+pub(crate) fn exact_on_lattice(differences: &[(DVec3, DVec3, DVec3)], bits: i32) -> bool {
     let largest = differences
         .iter()
         .fold(0.0f64, |m, (_, _, d)| m.max(d.abs().max_element()));
@@ -193,13 +193,14 @@ fn exact_on_lattice(differences: &[(DVec3, DVec3, DVec3)], bits: i32) -> bool {
     if !(-150..=161).contains(&exponent) {
         return false;
     }
-    let units = f64::powi(2.0, bits - exponent);
+    // A power of two by its bits, and whole numbers as those that come back from where numbers have no fractions: without
+    // calls into the mathematical library.
+    let units = f64::from_bits(((bits - exponent + 1023) as u64) << 52);
+    const NO_FRACTIONS: f64 = 1.5 * (1u64 << 52) as f64;
     differences.iter().all(|&(p, q, d)| {
         let exact = |p: f64, q: f64| two_sum(p, -q)[0] == 0.0;
-        exact(p.x, q.x) && exact(p.y, q.y) && exact(p.z, q.z) && {
-            let whole = d * units;
-            whole == whole.trunc()
-        }
+        let whole = |v: f64| (v * units + NO_FRACTIONS) - NO_FRACTIONS == v * units;
+        exact(p.x, q.x) & exact(p.y, q.y) & exact(p.z, q.z) & whole(d.x) & whole(d.y) & whole(d.z)
     })
 }
 
