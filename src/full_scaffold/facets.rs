@@ -181,14 +181,14 @@ fn any_of_four(codes: u16) -> u8 {
 /// Four bits as groups of four.
 const NIBBLES: [u16; 16] = {
     let mut table = [0; 16];
-    let mut i = 0;
-    while i < 64 {
-        table[i / 4] |= if i / 4 >> (i % 4) & 1 == 1 {
-            15 << (4 * (i % 4))
-        } else {
-            0
-        };
-        i += 1;
+    let mut bits = 0;
+    while bits < 16 {
+        let mut k = 0;
+        while k < 4 {
+            table[bits] |= (bits as u16 >> k & 1) * (15 << (4 * k));
+            k += 1;
+        }
+        bits += 1;
     }
     table
 };
@@ -196,10 +196,14 @@ const NIBBLES: [u16; 16] = {
 /// Four bits as every other bit.
 const TWICE: [u8; 16] = {
     let mut table = [0; 16];
-    let mut i = 0;
-    while i < 64 {
-        table[i / 4] |= ((i / 4 >> (i % 4) & 1) << (2 * (i % 4))) as u8;
-        i += 1;
+    let mut bits = 0;
+    while bits < 16 {
+        let mut k = 0;
+        while k < 4 {
+            table[bits] |= (bits as u8 >> k & 1) << (2 * k);
+            k += 1;
+        }
+        bits += 1;
     }
     table
 };
