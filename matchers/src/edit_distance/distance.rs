@@ -40,7 +40,8 @@ pub struct EditSettings {
     /// Largest number of nodes and of sheets of either graph for which the distance is proven.
     pub exact_up_to: usize,
     /// Most search nodes over all branch and bounds. Between two hypergraphs of 12 nodes, 18 curves and 6 sheets one takes 0.1 to
-    /// 1 ms.
+    /// 1 ms. 100 000: all pairs of graphs of up to 4 nodes are proven with contractions and merges, the complete graph against
+    /// itself, attributed, with 80 388.
     pub max_search_nodes: usize,
     /// Most heals judged in one round of step 2, cheapest first.
     pub max_heals_tried: usize,
@@ -55,7 +56,7 @@ impl Default for EditSettings {
             contract: true,
             merge: true,
             exact_up_to: 12,
-            max_search_nodes: 50_000,
+            max_search_nodes: 100_000,
             max_heals_tried: 48,
             matching: MatchSettings::default(),
         }
