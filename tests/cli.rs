@@ -171,6 +171,61 @@ fn scaffold_writes_what_the_contract_names_and_the_same_bytes_on_any_number_of_t
 /// A mask of thick slices does not know its surface better than half a slice: the tolerance is at least that unless one is asked for,
 /// and the result says so.
 #[test]
+fn the_bones_of_one_folder_are_named_by_those_of_another() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let folder = |name: &str| {
+        let path = dir.path().join(name);
+        fs::create_dir(&path).expect("a folder");
+        path
+    };
+    let [known, unknown, out] = ["known", "unknown", "out"].map(folder);
+    // The second set a quarter larger, in another pose, under names in another order.
+    let motion = datasets_synthetic::rigid::random(3);
+    let bones = [("capitate", "c"), ("lunate", "a"), ("pisiform", "b")];
+    for (name, other) in bones {
+        let made = match name {
+            "capitate" => datasets_synthetic::bones::capitate_like(0),
+            "lunate" => datasets_synthetic::bones::lunate_like(0),
+            _ => datasets_synthetic::bones::pisiform_like(0),
+        }
+        .mesh(1_500);
+        let mut mesh = medial_scaffold::geometry::TriangleMesh {
+            points: made.points,
+            triangles: made.triangles,
+        };
+        write_ply(&known.join(format!("{name}.ply")), &mesh);
+        for p in &mut mesh.points {
+            *p = motion.apply(1.25 * *p);
+        }
+        write_ply(&unknown.join(format!("{other}.ply")), &mesh);
+    }
+    fs::write(unknown.join("notes.txt"), "no shape").expect("a file");
+    let path = |p: &std::path::Path| p.to_str().expect("utf-8").to_owned();
+    let args = ["match", &path(&known), &path(&unknown), "--names"];
+    let run = medial(&[&args[..], &["--json", "-o", &path(&out)]].concat());
+    assert_eq!(run.status.code(), Some(0), "{}", stderr(&run));
+    let json: serde_json::Value = serde_json::from_slice(&run.stdout).expect("one document");
+    assert_eq!(json["schema"], "medial-scaffold/names");
+    let pairs = json["pairs"].as_array().expect("pairs");
+    assert_eq!(pairs.len(), 3);
+    for (name, other) in bones {
+        let found = pairs.iter().find(|p| p["source"] == format!("{other}.ply"));
+        assert_eq!(found.expect("a pair")["target"], format!("{name}.ply"));
+    }
+    assert!((json["size_ratio"].as_f64().expect("a number") - 1.25).abs() < 0.02);
+    assert!(stderr(&run).contains("notes.txt"), "{}", stderr(&run));
+    let table = fs::read_to_string(out.join("names.csv")).expect("a table");
+    assert_eq!(table.lines().count(), 4);
+    assert!(out.join("names.json").is_file());
+    // One file where a folder is wanted, and nowhere to put the result.
+    let one = path(&known.join("lunate.ply"));
+    let wrong = medial(&["match", &path(&known), &one, "--names", "--json"]);
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(stderr(&wrong).contains("lunate.ply"), "{}", stderr(&wrong));
+    assert_eq!(medial(&args).status.code(), Some(2));
+}
+
+#[test]
 fn the_tolerance_of_a_mask_is_at_least_half_its_largest_voxel_edge() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let mask = dir.path().join("ball.nrrd");

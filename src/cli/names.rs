@@ -17,6 +17,10 @@ use std::path::{Path, PathBuf};
 /// What `names.json` holds.
 #[derive(Debug, Serialize)]
 struct NamesDocument {
+    /// Name of this schema.
+    schema: &'static str,
+    /// Version of the program that wrote it.
+    version: &'static str,
     /// All sources were mirrored.
     mirrored: bool,
     /// Size of the sources over that of the targets, as the pairs agree on it.
@@ -160,6 +164,8 @@ fn document(found: &Naming, targets: &[Shape], sources: &[Shape]) -> NamesDocume
         ambiguous: p.ambiguous,
     };
     NamesDocument {
+        schema: "medial-scaffold/names",
+        version: env!("CARGO_PKG_VERSION"),
         mirrored: found.mirrored,
         size_ratio: found.size_ratio,
         pairs: found.pairs.iter().map(pair).collect(),

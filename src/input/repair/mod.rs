@@ -7,7 +7,7 @@
 //! 2. Faces with a repeated point are dropped. Faces on the same three points are dropped but for one, or altogether when they
 //!    cancel (two faces back to back enclose nothing), unless the whole mesh is a sheet given with both its sides. Faces
 //!    without area on three points stay: they hold the surface closed.
-//! 3. Faces are turned to agree across every edge with two faces.
+//! 3. Faces are turned to agree across every edge with two faces ([`orient`]).
 //! 4. Walls and fins that bound nothing are dropped ([`walls`]).
 //! 5. Where the surface touches itself in an edge or in a point it is taken apart ([`cut`]); points there are copied.
 //! 6. A closed component that no other encloses is turned outward. One that lies inside another keeps the turn the file gave it
@@ -18,10 +18,12 @@
 //! Cost `O(n log n)`, and `O(c)` winding numbers for each of `c` closed components.
 
 mod cut;
+mod orient;
 mod walls;
 
-use crate::geometry::{Neighbours, TriangleMesh, WindingNumber, mesh::DisjointSets};
+use crate::geometry::{Neighbours, TriangleMesh, mesh::DisjointSets};
 use cut::cut_apart;
+use orient::{agree_patches, turn_outward};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use walls::without_walls;
@@ -159,8 +161,9 @@ pub fn repair(mesh: &TriangleMesh, settings: &RepairSettings) -> Repaired {
         let cuts = cut_apart(&mut out);
         (changes.cut_edges, changes.cut_points) = (cuts.edges, cuts.points);
         turned.resize(out.triangles.len(), false);
-        let again = orient(&mut out, &turned, &mut changes);
-        changes.turned_triangles = turned.iter().zip(&again).filter(|(a, b)| a != b).count();
+        let last = turn_outward(&mut out, &turned);
+        changes.one_sided_components = last.one_sided_components;
+        changes.turned_triangles = turned.iter().zip(&last.turned).filter(|(a, b)| a != b).count();
     }
     let point_map = drop_unused(&mut out, &welded, &mut changes);
     Repaired {
@@ -267,190 +270,6 @@ fn drop_unused(mesh: &mut TriangleMesh, welded: &[u32], changes: &mut RepairChan
     }
     mesh.points = points;
     welded.iter().map(|&w| slot[w as usize]).collect()
-}
-
-/// Turns the faces of each patch (bounded by rims and by edges of three and more faces) to agree; returns which were turned.
-fn agree_patches(mesh: &mut TriangleMesh) -> Vec<bool> {
-    let neighbours = across_edges(mesh);
-    let mut turned = vec![false; mesh.triangles.len()];
-    for part in &mesh.components() {
-        agree(part, &neighbours, &mut turned);
-    }
-    for (t, _) in mesh
-        .triangles
-        .iter_mut()
-        .zip(&turned)
-        .filter(|(_, turned)| **turned)
-    {
-        t.swap(1, 2);
-    }
-    turned
-}
-
-/// Turns faces to agree, then closed components outward; `before` says which faces were turned already. Returns which were turned
-/// now.
-fn orient(mesh: &mut TriangleMesh, before: &[bool], changes: &mut RepairChanges) -> Vec<bool> {
-    let parts = mesh.components();
-    let neighbours = across_edges(mesh);
-    let mut turned = vec![false; mesh.triangles.len()];
-    let mut shells: Vec<Shell> = Vec::new();
-    for part in &parts {
-        let agreement = agree(part, &neighbours, &mut turned);
-        if agreement == Agreement::Impossible {
-            changes.one_sided_components += 1;
-            continue;
-        }
-        for &t in part {
-            if turned[t as usize] {
-                mesh.triangles[t as usize].swap(1, 2);
-            }
-        }
-        let piece = mesh.submesh(part);
-        if piece.topology().watertight {
-            shells.push(Shell {
-                triangles: part.clone(),
-                volume: piece.signed_volume(),
-                given: agreement == Agreement::AsGiven && !part.iter().any(|&t| before[t as usize]),
-                piece,
-            });
-        }
-    }
-    for (i, flip) in turn_outward(&shells).into_iter().enumerate() {
-        if flip {
-            for &t in &shells[i].triangles {
-                mesh.triangles[t as usize].swap(1, 2);
-                turned[t as usize] ^= true;
-            }
-        }
-    }
-    turned
-}
-
-/// A closed component whose faces agree.
-struct Shell {
-    triangles: Vec<u32>,
-    piece: TriangleMesh,
-    volume: f64,
-    /// The file gave it this orientation.
-    given: bool,
-}
-
-/// Which shells must be turned over.
-fn turn_outward(shells: &[Shell]) -> Vec<bool> {
-    let windings: Vec<Option<WindingNumber>> = shells.iter().map(|s| WindingNumber::new(&s.piece)).collect();
-    // For every shell those that enclose it, the largest last.
-    let enclosing: Vec<Vec<usize>> = (0..shells.len())
-        .map(|i| {
-            let probe = shells[i].piece.points[0];
-            let mut around: Vec<usize> = (0..shells.len())
-                .filter(|&j| j != i && shells[j].volume.abs() > shells[i].volume.abs())
-                .filter(|&j| windings[j].as_ref().is_some_and(|w| w.winding(probe).abs() > 0.5))
-                .collect();
-            around.sort_by(|&a, &b| {
-                shells[a]
-                    .volume
-                    .abs()
-                    .total_cmp(&shells[b].volume.abs())
-                    .then(a.cmp(&b))
-            });
-            around
-        })
-        .collect();
-    (0..shells.len())
-        .map(|i| match enclosing[i].last() {
-            None => shells[i].volume < 0.0,
-            // The file's own turn, relative to that of the outermost shell about it.
-            Some(&outermost) if shells[i].given && shells[outermost].given => shells[outermost].volume < 0.0,
-            // No turn of its own: solid and hollow take turns from outside in.
-            Some(_) => (shells[i].volume < 0.0) == enclosing[i].len().is_multiple_of(2),
-        })
-        .collect()
-}
-
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Agreement {
-    AsGiven,
-    AfterTurning,
-    Impossible,
-}
-
-/// A neighbour across an edge with two faces, and whether the two run along it the same way (so one must be turned).
-#[derive(Clone, Copy)]
-struct Across {
-    triangle: u32,
-    clash: bool,
-}
-
-/// The neighbours of every triangle across its edges with exactly two faces.
-fn across_edges(mesh: &TriangleMesh) -> Vec<[Option<Across>; 3]> {
-    let mut sides: Vec<(u32, u32, u32, bool)> = mesh
-        .triangles
-        .iter()
-        .enumerate()
-        .flat_map(|(i, &[a, b, c])| {
-            [(a, b), (b, c), (c, a)].map(|(u, v)| (u.min(v), u.max(v), i as u32, u < v))
-        })
-        .collect();
-    sides.sort_unstable();
-    let mut out = vec![[None; 3]; mesh.triangles.len()];
-    for run in sides.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-        let &[(_, _, s, s_forward), (_, _, t, t_forward)] = run else {
-            continue;
-        };
-        let clash = s_forward == t_forward;
-        for (from, to) in [(s, t), (t, s)] {
-            if let Some(free) = out[from as usize].iter_mut().find(|n| n.is_none()) {
-                *free = Some(Across { triangle: to, clash });
-            }
-        }
-    }
-    out
-}
-
-/// Marks the faces of a component that must be turned; the largest group that agrees as given stays.
-fn agree(part: &[u32], neighbours: &[[Option<Across>; 3]], turned: &mut [bool]) -> Agreement {
-    let mut seen: HashMap<u32, ()> = HashMap::with_capacity(part.len());
-    let mut possible = true;
-    let mut any = false;
-    // A component joined by points or by edges of three faces falls into several patches.
-    for &seed in part {
-        if seen.contains_key(&seed) {
-            continue;
-        }
-        seen.insert(seed, ());
-        let mut patch = vec![seed];
-        let mut next = 0;
-        while next < patch.len() {
-            let t = patch[next];
-            next += 1;
-            for n in neighbours[t as usize].iter().flatten() {
-                let wanted = turned[t as usize] ^ n.clash;
-                if seen.insert(n.triangle, ()).is_none() {
-                    turned[n.triangle as usize] = wanted;
-                    patch.push(n.triangle);
-                } else if turned[n.triangle as usize] != wanted {
-                    possible = false;
-                }
-            }
-        }
-        let flips = patch.iter().filter(|&&t| turned[t as usize]).count();
-        if 2 * flips > patch.len() {
-            for &t in &patch {
-                turned[t as usize] ^= true;
-            }
-        }
-        any |= flips > 0;
-    }
-    if !possible {
-        for &t in part {
-            turned[t as usize] = false;
-        }
-        Agreement::Impossible
-    } else if any {
-        Agreement::AfterTurning
-    } else {
-        Agreement::AsGiven
-    }
 }
 
 #[cfg(test)]
