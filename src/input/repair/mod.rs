@@ -455,6 +455,34 @@ mod tests {
     }
 
     #[test]
+    fn random_soups_are_taken_apart_and_keep_their_area() {
+        use rand::{RngExt, SeedableRng};
+        for seed in 0..400 {
+            let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+            let n = rng.random_range(4..9u32);
+            let mut coordinate = || f64::from(rng.random_range(-1000..1000));
+            let points = (0..n)
+                .map(|_| DVec3::new(coordinate(), coordinate(), coordinate()))
+                .collect();
+            let triangles = (0..rng.random_range(4..40))
+                .map(|_| [0; 3].map(|_| rng.random_range(0..n)))
+                .collect();
+            let soup = TriangleMesh { points, triangles };
+            let fixed = repair(&soup, &RepairSettings::default());
+            let area = |t: &[u32; 3]| {
+                let [a, b, c] = t.map(|i| soup.points[i as usize]);
+                0.5 * (b - a).cross(c - a).length()
+            };
+            let kept = soup.triangles.iter().zip(&fixed.triangle_map);
+            let kept: f64 = kept
+                .filter(|(_, new)| **new != DROPPED)
+                .map(|(t, _)| area(t))
+                .sum();
+            assert!((fixed.mesh.area() - kept).abs() <= 1e-9 * kept, "soup {seed}");
+        }
+    }
+
+    #[test]
     fn near_points_are_joined_within_the_tolerance_only() {
         let mut mesh = tetrahedron(1.0);
         mesh.points.push(mesh.points[0] + DVec3::X * 1e-3);
