@@ -12,9 +12,7 @@ use medial_scaffold::segregation::{
     Balls, ChangeKind, ClosedOrOpen, KnownSurface, KnownSurfaceSettings, SegregationError,
     SegregationSettings, segregate_cloud, segregate_known, segregate_known_refined, segregate_mesh,
 };
-use segregation_support::{
-    cloud, corrupted, cuboid, data_mesh, describe, patch, sample, shapes, sphere, torus,
-};
+use segregation_support::{cloud, corrupted, cuboid, describe, patch, sample, shapes, sphere, torus};
 use std::f64::consts::TAU;
 
 fn segregate(
@@ -119,29 +117,6 @@ fn too_few_samples_are_refined_where_it_matters() {
         refined.result.segregation.warnings
     );
     assert!(refined.added > 0 && refined.rounds > 0);
-}
-
-#[test]
-fn the_talus_with_a_hidden_pocket_is_right_or_says_so() {
-    let Some(surface) = data_mesh("tarsal_visiblehuman_ccby4/VHF_Right", "Talus") else {
-        return;
-    };
-    let parts = surface.components();
-    let largest = parts.iter().max_by_key(|c| c.len()).expect("a mesh has parts");
-    let surface = surface.submesh(largest);
-    let points = sample(&surface, 10_000, 1);
-    let coarse = segregate(&points, &surface);
-    let refined = segregate_known_refined(&points, &surface, &KnownSurfaceSettings::default())
-        .expect("a closed surface");
-    println!(
-        "talus: {:?} -> {:?} after {} rounds and {} added points; known {:?}",
-        coarse.report.found_euler,
-        refined.result.report.found_euler,
-        refined.rounds,
-        refined.added,
-        refined.result.report.expected_euler
-    );
-    assert!(refined.result.report.agree || !refined.result.segregation.warnings.is_empty());
 }
 
 #[test]

@@ -5,6 +5,7 @@ use super::output::{print_json, print_text};
 use super::{Failure, Verdict};
 use clap::{Args, ValueEnum};
 use medial_scaffold::input::check::{CheckContent, CheckReport, Purpose, Severity, check};
+use medial_scaffold::reports::plot::pretty;
 use std::path::PathBuf;
 
 /// Arguments of `medial check`.
@@ -76,7 +77,7 @@ fn text(report: &CheckReport) -> String {
     let p = &report.provenance;
     let [lo, hi] = report.bounds_mm;
     let mut out = format!(
-        "{}: {}\n  frame {}, units {}; box {:.3} x {:.3} x {:.3} mm\n",
+        "{}: {}\n  frame {}, units {}; box {} x {} x {} mm\n",
         p.path.display(),
         match (report.usable, report.uses.iter().all(|u| u.fit)) {
             (true, true) => "usable",
@@ -85,30 +86,31 @@ fn text(report: &CheckReport) -> String {
         },
         p.frame,
         p.units,
-        hi[0] - lo[0],
-        hi[1] - lo[1],
-        hi[2] - lo[2],
+        pretty(hi[0] - lo[0]),
+        pretty(hi[1] - lo[1]),
+        pretty(hi[2] - lo[2]),
     );
     out += &match &report.content {
         CheckContent::Cloud(c) => format!(
-            "  cloud: {} points ({} duplicates), normals: {}, spacing about {:.4} mm\n",
+            "  cloud: {} points ({} duplicates), normals: {}, spacing about {} mm\n",
             c.points,
             c.duplicates,
             if c.normals { "yes" } else { "no" },
-            c.spacing_mm
+            pretty(c.spacing_mm)
         ),
         CheckContent::Mesh(m) => format!(
-            "  mesh: {} points, {} triangles, {} components, Euler number {}, {} open and {} non-manifold edges\n  area {:.3} mm^2, volume {}\n",
+            "  mesh: {} points, {} triangles, {} components, Euler number {}, {} open and {} non-manifold edges\n  area {} mm^2, volume {}\n",
             m.points,
             m.topology.triangles,
             m.topology.components,
             m.topology.euler,
             m.topology.boundary_edges,
             m.topology.nonmanifold_edges,
-            m.area_mm2,
+            pretty(m.area_mm2),
             m.volume_mm3
                 .map_or(String::from("none (not closed and oriented)"), |v| format!(
-                    "{v:.3} mm^3"
+                    "{} mm^3",
+                    pretty(v)
                 )),
         ),
         CheckContent::Labels(l) => {
@@ -118,8 +120,10 @@ fn text(report: &CheckReport) -> String {
             );
             for label in &l.labels {
                 text += &format!(
-                    "  label {}: {} voxels, {:.3} mm^3\n",
-                    label.label, label.voxels, label.volume_mm3
+                    "  label {}: {} voxels, {} mm^3\n",
+                    label.label,
+                    label.voxels,
+                    pretty(label.volume_mm3)
                 );
             }
             text

@@ -130,7 +130,11 @@ fn summary(done: &ScaffoldRun) -> String {
         pretty(s.area),
         <[i64; 3]>::from(t.solid_betti),
         <[i64; 3]>::from(t.scaffold_betti),
-        if t.agree { "agree" } else { "DISAGREE" },
+        match (t.agree, t.surface_as_given) {
+            (false, _) => "DISAGREE",
+            (true, Some(false)) => "agree, but the surface given has others",
+            (true, _) => "agree",
+        },
         document.full.morse,
         pretty(document.fidelity.hausdorff),
         document.fidelity.hausdorff_percent_diag,

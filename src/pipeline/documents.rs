@@ -96,15 +96,18 @@ pub struct TopologySummary {
     pub scaffold_betti: Betti,
     /// Whether they are equal.
     pub agree: bool,
+    /// Whether the surface found has the components and Euler numbers of the surface given; null for a cloud, which gives none.
+    pub surface_as_given: Option<bool>,
 }
 
 impl TopologySummary {
     /// Compares the two.
-    pub fn new(solid_betti: Betti, scaffold_betti: Betti) -> Self {
+    pub fn new(solid_betti: Betti, scaffold_betti: Betti, surface_as_given: Option<bool>) -> Self {
         Self {
             solid_betti,
             scaffold_betti,
             agree: solid_betti == scaffold_betti,
+            surface_as_given,
         }
     }
 }

@@ -127,7 +127,7 @@ pub(super) fn run(
         coarse_scaffold(&fine, &regularised, &settings.coarse)
     });
     let solid = stages.run("topology", || solid_betti_of(&sided.triangulation, &domain));
-    let topology = TopologySummary::new(solid, regularised.betti());
+    let topology = TopologySummary::new(solid, regularised.betti(), sided.surface_as_given);
     warnings.extend(sided.segregation.warnings.iter().cloned());
     Ok(ScaffoldRun {
         name: shape.name.clone(),
@@ -177,6 +177,7 @@ struct Sided {
     triangulation: Triangulation,
     segregation: Segregation,
     known_surface: Option<TriangleMesh>,
+    surface_as_given: Option<bool>,
     cloud: Option<CloudReport>,
 }
 
@@ -198,6 +199,7 @@ fn side_of_surface(
             })?;
             return Ok(Sided {
                 triangulation: found.triangulation,
+                surface_as_given: Some(found.result.report.agree),
                 segregation: found.result.segregation,
                 known_surface: Some(known),
                 cloud: None,
@@ -215,6 +217,7 @@ fn side_of_surface(
         triangulation: found.triangulation,
         segregation: found.segregation,
         known_surface: None,
+        surface_as_given: None,
         cloud: Some(found.report),
     })
 }

@@ -94,9 +94,17 @@ fn figures(report: &mut Report, s: &Value, tolerance: f64) -> Result<(), ReportE
             .push(KeyFigure::new("Shape change", shown(s, "fidelity.hausdorff"), "mm").note(percent));
     }
     if let Some(agree) = at(s, "topology.agree").and_then(Value::as_bool) {
+        let betti = format!("Betti numbers {}", shown(s, "topology.scaffold_betti"));
+        let as_given = at(s, "topology.surface_as_given").and_then(Value::as_bool) != Some(false);
+        let note = if as_given {
+            betti
+        } else {
+            format!("{betti}; the surface given has others")
+        };
+        let agree = agree && as_given;
         report.figures.push(
             KeyFigure::new("Topology", if agree { "agrees" } else { "differs" }, "")
-                .note(format!("Betti numbers {}", shown(s, "topology.scaffold_betti")))
+                .note(note)
                 .check(agree),
         );
     }

@@ -19,6 +19,7 @@
 use super::balls::Balls;
 use super::error::SegregationError;
 use super::flood::{Regions, regions};
+use super::known_repair::RepairedPlace;
 use super::labels::{Segregation, boundary_facets, boundary_triangles, mesh_of};
 use crate::delaunay::{Facet, Triangulation};
 use crate::geometry::{MeshTopology, Neighbours, TetId, TriangleMesh};
@@ -98,7 +99,7 @@ pub struct KnownSurfaceReport {
     pub expected: MeshTopology,
     /// Topology of the segregated surface.
     pub found: MeshTopology,
-    /// Euler numbers of the components of the known surface, sorted.
+    /// Euler numbers of the components of the known surface that enclose volume, sorted.
     pub expected_euler: Vec<i64>,
     /// Euler numbers of the components of the segregated surface, sorted.
     pub found_euler: Vec<i64>,
@@ -106,6 +107,8 @@ pub struct KnownSurfaceReport {
     pub agree: bool,
     /// Where more generators are needed; empty when `agree`.
     pub needs_refinement: Vec<RefinementPlace>,
+    /// Where labels were changed after all refinement so that the topology agrees ([`super::known_repair`]); most often empty.
+    pub repaired: Vec<RepairedPlace>,
 }
 
 /// Labels, triangles and report.
@@ -148,7 +151,10 @@ pub fn segregate_known(
     let triangles = boundary_triangles(triangulation, &inside);
     let mesh = mesh_of(triangulation, &triangles);
     let found = mesh.topology();
-    let expected_euler = component_eulers(surface);
+    let expected_euler = enclosing_parts(surface)
+        .into_iter()
+        .map(|p| p.euler)
+        .collect::<Vec<_>>();
     let found_euler = component_eulers(&mesh);
     let agree = expected_euler == found_euler
         && found.nonmanifold_edges == 0
@@ -193,6 +199,7 @@ pub fn segregate_known(
             found_euler,
             agree,
             needs_refinement,
+            repaired: Vec::new(),
         },
     })
 }
@@ -261,7 +268,7 @@ pub(super) fn label_flat(triangulation: &Triangulation, flat: &[bool], inside: &
 }
 
 /// Euler numbers of components for a message: each of a few, the sum of many.
-fn eulers_in_words(eulers: &[i64]) -> String {
+pub(super) fn eulers_in_words(eulers: &[i64]) -> String {
     const SHOWN: usize = 6;
     if eulers.len() <= SHOWN {
         return format!("Euler numbers {eulers:?}");
@@ -274,17 +281,41 @@ fn eulers_in_words(eulers: &[i64]) -> String {
     )
 }
 
+/// A component of a known surface that encloses volume.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct EnclosingPart {
+    pub euler: i64,
+    /// Whether it bounds a cavity (it is oriented inwards).
+    pub cavity: bool,
+}
+
+/// Volume below which a component encloses nothing, as a share of the volume that its area could enclose.
+const NO_VOLUME: f64 = 1e-9;
+
+/// The components of a closed surface that enclose volume, by Euler number. Segmentation programs leave pairs of triangles back to
+/// back; such a part has no inside, so no labels can show it.
+pub(super) fn enclosing_parts(surface: &TriangleMesh) -> Vec<EnclosingPart> {
+    let mut out: Vec<EnclosingPart> = surface
+        .components()
+        .iter()
+        .map(|c| surface.submesh(c))
+        .filter(|part| part.signed_volume().abs() > NO_VOLUME * part.area().powf(1.5))
+        .map(|part| EnclosingPart {
+            euler: part.topology().euler,
+            cavity: part.signed_volume() < 0.0,
+        })
+        .collect();
+    out.sort_unstable_by_key(|p| (p.euler, p.cavity));
+    out
+}
+
 /// Euler numbers of the connected components, sorted.
 pub(super) fn component_eulers(mesh: &TriangleMesh) -> Vec<i64> {
-    let components = mesh.components();
-    let mut out: Vec<i64> = if components.len() == 1 {
-        vec![mesh.topology().euler]
-    } else {
-        components
-            .iter()
-            .map(|c| mesh.submesh(c).topology().euler)
-            .collect()
-    };
+    let mut out: Vec<i64> = mesh
+        .components()
+        .iter()
+        .map(|c| mesh.submesh(c).topology().euler)
+        .collect();
     out.sort_unstable();
     out
 }

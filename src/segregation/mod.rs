@@ -4,7 +4,7 @@
 //! mesh over the generators and the inside/outside label of every tetrahedron.
 //!
 //! * [`known_surface`]: a mesh or mask says where its surface is; one winding number a region ([`flood`]); [`refine`] adds
-//!   generators where that does not give the surface's topology.
+//!   generators where that does not give the surface's topology, and [`known_repair`] changes the last labels that no sampling would.
 //! * [`cloud`]: a raw cloud is prepared ([`prepare`]: outliers, noise), shows its surface by greedy gap transforms
 //!   ([`gap_transforms`] at the price of [`gap_cost`]), is closed ([`closure`]: [`diffusion`], [`labelling`] with [`min_cut`], [`islands`],
 //!   [`star_repair`], [`adopt`], [`handles`]), judged open or closed (`judge`, [`openness`]), tried otherwise where noise is strong (`runs`), oriented ([`orient`]), reported
@@ -22,9 +22,11 @@ pub mod flood;
 pub mod gap_cost;
 pub mod gap_transforms;
 pub mod handles;
+mod homotopic_growth;
 pub mod islands;
 mod judge;
 pub mod known_queries;
+pub mod known_repair;
 pub mod known_surface;
 pub mod labelling;
 pub mod labels;
@@ -47,6 +49,7 @@ pub use cloud::{CloudSegregation, segregate_cloud};
 pub use error::SegregationError;
 pub use gap_cost::CostRule;
 pub use known_queries::KnownSurface;
+pub use known_repair::RepairedPlace;
 pub use known_surface::{
     KnownSurfaceReport, KnownSurfaceSegregation, KnownSurfaceSettings, RefinementPlace, RefinementReason,
     segregate_known,

@@ -4,12 +4,16 @@
 //! many points were added. Each round triangulates, segregates, and adds the places that
 //! [`segregate_known`] lists: crossings of the surface with curves of the full scaffold that cross
 //! it more than once, farthest from the generators by construction (Boissonnat & Oudot 2005). It ends when the topology
-//! agrees, nothing is left to add, or a limit is reached; then the best round is returned and its warnings say what was not
-//! resolved.
+//! agrees, nothing is left to add, or a limit is reached; then the last labels of the best round are changed so that the topology agrees
+//! ([`super::known_repair`]), and its warnings say where, or that it was not resolved.
 
 use super::error::SegregationError;
 use super::known_queries::KnownSurface;
-use super::known_surface::{KnownSurfaceSegregation, KnownSurfaceSettings, segregate_known};
+use super::known_repair::{RepairedPlace, repair_topology};
+use super::known_surface::{
+    KnownSurfaceSegregation, KnownSurfaceSettings, component_eulers, eulers_in_words, segregate_known,
+};
+use super::labels::{boundary_triangles, mesh_of};
 use crate::delaunay::{DelaunaySettings, Triangulation, delaunay};
 use crate::geometry::TriangleMesh;
 use glam::DVec3;
@@ -67,19 +71,56 @@ pub fn segregate_known_refined(
     }
     let mut best = best.expect("the first round always gives a segregation");
     if !best.result.report.agree {
-        best.result.segregation.warnings.push(format!(
-            "refinement (best after {} rounds and {} added generators) did not resolve the surface's topology: some part of it is \
-             thinner than any sampling tried",
-            best.rounds, best.added
-        ));
+        best.repair(surface, &known);
     }
     Ok(best)
+}
+
+/// What a user should know of a repair; nothing when nothing moved.
+fn moved_in_words(places: &[RepairedPlace]) -> Option<String> {
+    let worst = places.first()?;
+    let [x, y, z] = worst.place.to_array();
+    Some(format!(
+        "the shape is thinner than its sampling in {} {}; the surface was moved there, by at most {:.2e} mm, at ({x:.4}, {y:.4}, {z:.4}), \
+         so that its topology is right",
+        places.len(),
+        if places.len() == 1 { "place" } else { "places" },
+        worst.moved_mm
+    ))
 }
 
 /// Generators that may always be added, so that very small samples can be refined at all.
 const SMALL_SAMPLE: usize = 1000;
 
 impl RefinedSegregation {
+    /// Changes the labels that stand between the result and the surface's topology, or at least a manifold; says which.
+    fn repair(&mut self, surface: &TriangleMesh, known: &KnownSurface) {
+        let segregation = &mut self.result.segregation;
+        let repair = repair_topology(&self.triangulation, surface, known, &segregation.inside);
+        segregation.inside = repair.inside;
+        segregation.triangles = boundary_triangles(&self.triangulation, &segregation.inside);
+        let mesh = mesh_of(&self.triangulation, &segregation.triangles);
+        let report = &mut self.result.report;
+        report.found = mesh.topology();
+        report.found_euler = component_eulers(&mesh);
+        report.agree = repair.agrees;
+        report.repaired = repair.places;
+        segregation.warnings.clear();
+        if repair.agrees {
+            report.needs_refinement.clear();
+            segregation.warnings.extend(moved_in_words(&report.repaired));
+        } else {
+            segregation.warnings.push(format!(
+                "the surface found has {}, the one given {}: it is thinner than the sampling in many places, and refinement (best after {} \
+                 rounds and {} added points) did not resolve them; a finer --spacing may",
+                eulers_in_words(&report.found_euler),
+                eulers_in_words(&report.expected_euler),
+                self.rounds,
+                self.added
+            ));
+        }
+    }
+
     /// How wrong the topology is: pinches first, then components and Euler numbers.
     fn fault(&self) -> [u64; 2] {
         let r = &self.result.report;
