@@ -2,11 +2,11 @@
 
 use datasets_synthetic::shapes;
 use medial_scaffold::coarse_scaffold::{
-    CoarseScaffold, CoarseScaffoldSettings, CurveKind, Host, NodeKind, coarse_scaffold,
+    CoarseScaffold, CoarseScaffoldSettings, Curve, CurveKind, Host, Node, NodeKind, Sheet, coarse_scaffold,
 };
-use medial_scaffold::fine_scaffold::{FineScaffoldSettings, fine_scaffold};
-use medial_scaffold::geometry::{Length, TriangleMesh};
-use medial_scaffold::regularise::{RegulariseSettings, regularise};
+use medial_scaffold::fine_scaffold::{FineScaffold, FineScaffoldSettings, fine_scaffold};
+use medial_scaffold::geometry::{CurveId, Length, NodeId, SheetId, TriangleMesh};
+use medial_scaffold::regularise::{RegulariseSettings, regularise, replay};
 use medial_scaffold::segregation::{KnownSurfaceSettings, segregate_known_refined};
 
 fn scaffold(shape: &shapes::Shape, n: usize, seed: u64) -> CoarseScaffold {
@@ -15,6 +15,17 @@ fn scaffold(shape: &shapes::Shape, n: usize, seed: u64) -> CoarseScaffold {
 
 /// At a tolerance in % of the diagonal.
 fn scaffold_at(shape: &shapes::Shape, n: usize, seed: u64, percent: f64) -> CoarseScaffold {
+    let fine = fine_of(shape, n, seed);
+    let settings = RegulariseSettings {
+        tolerance: Length::PercentDiagonal(percent),
+        ..RegulariseSettings::default()
+    };
+    let regularised = regularise(&fine, &settings).expect("topology is kept");
+    assert!(regularised.fidelity.max_tolerances <= 1.0);
+    coarse_scaffold(&fine, &regularised, &CoarseScaffoldSettings::default())
+}
+
+fn fine_of(shape: &shapes::Shape, n: usize, seed: u64) -> FineScaffold {
     let mesh = shape.mesh(20_000);
     let surface = TriangleMesh {
         points: mesh.points,
@@ -23,19 +34,12 @@ fn scaffold_at(shape: &shapes::Shape, n: usize, seed: u64, percent: f64) -> Coar
     let points = shape.sample_poisson(n, seed).points;
     let refined = segregate_known_refined(&points, &surface, &KnownSurfaceSettings::default())
         .expect("a closed surface");
-    let fine = fine_scaffold(
+    fine_scaffold(
         &refined.triangulation,
         &refined.result.segregation,
         &FineScaffoldSettings::default(),
     )
-    .expect("an inside");
-    let settings = RegulariseSettings {
-        tolerance: Length::PercentDiagonal(percent),
-        ..RegulariseSettings::default()
-    };
-    let regularised = regularise(&fine, &settings).expect("topology is kept");
-    assert!(regularised.fidelity.max_tolerances <= 1.0);
-    coarse_scaffold(&fine, &regularised, &CoarseScaffoldSettings::default())
+    .expect("an inside")
 }
 
 /// Sheets, axial curves, ribs, wires, nodes.
@@ -175,4 +179,149 @@ fn views_are_nested_and_keep_what_there_is() {
     let text = serde_json::to_string(&s).expect("finite numbers");
     let back: CoarseScaffold = serde_json::from_str(&text).expect("the same fields");
     assert_eq!(back.curves, s.curves);
+}
+
+#[test]
+fn spines_keep_the_surface_and_change_nothing_in_the_graph() {
+    // A slab whose edges are below the tolerance: their crests are what the one sheet that stays is farthest from.
+    let fine = fine_of(&shapes::slab(0.3), 5000, 1);
+    let run = |spine_from: f64| {
+        let settings = RegulariseSettings {
+            tolerance: Length::PercentDiagonal(1.5),
+            spine_from,
+            ..RegulariseSettings::default()
+        };
+        let regularised = regularise(&fine, &settings).expect("topology is kept");
+        let coarse = coarse_scaffold(&fine, &regularised, &CoarseScaffoldSettings::default());
+        (regularised, coarse)
+    };
+    let (none, without) = run(1.0);
+    assert!(none.spines.is_empty());
+    assert!(
+        none.fidelity.max_tolerances > 0.3,
+        "{}",
+        none.fidelity.max_tolerances
+    );
+    let (spines, with) = run(0.3);
+    assert!(!spines.spines.is_empty());
+    assert!(
+        spines.fidelity.max_tolerances <= 0.3,
+        "{}",
+        spines.fidelity.max_tolerances
+    );
+    assert_eq!(replay(&fine, &spines.log).as_ref(), Ok(&spines.alive));
+    assert_eq!(with.nodes, without.nodes);
+    assert_eq!(with.curves, without.curves);
+    assert_eq!(counts(&with), counts(&without));
+    assert!(with.fine.generator_host.iter().all(|h| *h != Host::Absent));
+}
+
+/// A scaffold of curves between nodes, all persistences as given; no geometry.
+fn drawn(nodes: u32, sheets: &[f64], curves: &[(CurveKind, f64, [u32; 2], &[u32])]) -> CoarseScaffold {
+    let curves: Vec<Curve> = curves
+        .iter()
+        .enumerate()
+        .map(|(i, &(kind, persistence, ends, sheets))| Curve {
+            id: CurveId::from_index(i),
+            kind,
+            persistence,
+            nodes: ends.map(NodeId).to_vec(),
+            closed: ends[0] == ends[1],
+            sheets: sheets.iter().copied().map(SheetId).collect(),
+            length: 1.0,
+            polyline: Vec::new(),
+        })
+        .collect();
+    CoarseScaffold {
+        tolerance_mm: 1.0,
+        diagonal_mm: 100.0,
+        nodes: (0..nodes)
+            .map(|n| Node {
+                id: NodeId(n),
+                kind: NodeKind::Degenerate,
+                position: Default::default(),
+                radius: 1.0,
+                curves: curves
+                    .iter()
+                    .filter(|c| c.nodes.contains(&NodeId(n)))
+                    .map(|c| c.id)
+                    .collect(),
+                persistence: 0.0,
+            })
+            .collect(),
+        sheets: sheets
+            .iter()
+            .enumerate()
+            .map(|(i, &persistence)| Sheet {
+                id: SheetId::from_index(i),
+                persistence,
+                boundary: Vec::new(),
+                area: 1.0,
+                mean_radius: 1.0,
+                max_radius: 1.0,
+                volume_share: 1.0 / sheets.len() as f64,
+                generators: 1,
+                moments: Default::default(),
+                mesh: Default::default(),
+            })
+            .collect(),
+        curves,
+        ..CoarseScaffold::default()
+    }
+}
+
+#[test]
+fn in_a_view_an_axial_curve_goes_on_where_only_ribs_end_beside_it() {
+    use CurveKind::{Axial, Rib};
+    // Two fins, sheets 2 and 3, on one curve between sheets 0 and 1, with a gap at node 1; node 4 is the tip of what hung on it.
+    let s = drawn(
+        5,
+        &[9.0, 8.0, 4.0, 3.0],
+        &[
+            (Axial, 4.0, [1, 0], &[0, 1, 2]),
+            (Rib, 4.0, [0, 1], &[2]),
+            (Axial, 3.0, [1, 2], &[0, 1, 3]),
+            (Rib, 3.0, [1, 2], &[3]),
+            (Axial, 1.2, [1, 4], &[0, 0, 1]),
+            (Rib, 9.0, [4, 0], &[0]),
+        ],
+    );
+    let at = |t: f64| {
+        let view = s.view(t);
+        check_references(&view);
+        counts(&view)
+    };
+    // With a third curve there the node is one; without it the curve runs through from node 0 to 2.
+    assert_eq!(at(1.1)[..2], [4, 3]);
+    assert_eq!(at(2.0)[..2], [4, 1]);
+    let through = s.view(2.0);
+    let axial = through
+        .curves
+        .iter()
+        .find(|c| c.kind == Axial)
+        .expect("one is left");
+    assert_eq!((axial.persistence, axial.length), (4.0, 2.0));
+    assert_eq!(axial.sheets, [0, 1, 2, 3].map(SheetId));
+    let ends: Vec<usize> = axial
+        .nodes
+        .iter()
+        .map(|n| through.nodes[n.index()].curves.len())
+        .collect();
+    assert_eq!(ends, [3, 2]);
+    // The ribs of the two fins stay two.
+    assert_eq!(through.curves.iter().filter(|c| c.kind == Rib).count(), 3);
+
+    // Of curves that share one sheet only, or with a wire beside them, none goes on.
+    for (other, beside) in [(&[1, 3, 3][..], Rib), (&[0, 1, 3][..], CurveKind::Wire)] {
+        let s = drawn(
+            4,
+            &[9.0, 8.0, 4.0, 3.0],
+            &[
+                (Axial, 4.0, [0, 1], &[0, 1, 2]),
+                (Axial, 3.0, [1, 2], other),
+                (beside, 9.0, [1, 3], if beside == Rib { &[0] } else { &[] }),
+            ],
+        );
+        assert_eq!(counts(&s.view(2.0))[1], 2);
+    }
 }

@@ -2,7 +2,9 @@
 
 use super::filters::{Filter, filtered};
 use super::run::{Run, data, read_mesh, run, run_cloud, sample};
-use super::stability::{Agreement, HEADING, counts, mean_distance, medial_distance};
+use super::stability::{
+    Agreement, HEADING, NEAR, counts, gap_of, mean_distance, medial_distance, rms_distance,
+};
 use glam::DVec3;
 use medial_scaffold::geometry::{Length, TriangleMesh};
 use medial_scaffold::registration::{RegistrationSettings, RegistrationShape, register};
@@ -94,9 +96,16 @@ fn line(
         agreement.add(&a, &b);
         if verbose {
             let ([axial_a, sheets_a], [axial_b, sheets_b]) = (counts(&a.coarse), counts(&b.coarse));
+            let gap = gap_of(&[&a.coarse, &b.coarse], NEAR);
+            let [at_a, at_b] = [&a, &b].map(|r| counts(&r.coarse.view(gap)));
             eprintln!(
-                "{:50} sheets {sheets_a:2} {sheets_b:2} axial {axial_a:2} {axial_b:2} fidelity {:.2} {:.2}",
+                "{:50} sheets {sheets_a:2} {sheets_b:2} axial {axial_a:2} {axial_b:2}, at {:.2} tolerances {} {} and {} {}, fidelity {:.2} {:.2}",
                 file.file_name().unwrap_or_default().to_string_lossy(),
+                gap / a.coarse.tolerance_mm,
+                at_a[1],
+                at_b[1],
+                at_a[0],
+                at_b[0],
                 a.regularised.fidelity.max_tolerances,
                 b.regularised.fidelity.max_tolerances,
             );
@@ -128,11 +137,14 @@ fn again(
     }
 }
 
-/// Left bones against the mirror images of the right ones: how far the medial points and the surfaces are apart.
+/// Left bones against the mirror images of the right ones: how far the medial points and the surfaces are apart. Every distance is
+/// the mean of both ways, over all points by area; the medial points of all that the scaffolds hold, and of what is left at the gap of both.
 fn mirrored(n: usize, settings: &RegulariseSettings) -> Result<(), Box<dyn Error>> {
-    println!("\n| left against mirrored right | axial | sheets | surfaces %D | medial points %D | ratio |");
-    println!("|---|---|---|---|---|---|");
-    let mut ratios = Vec::new();
+    println!(
+        "\n| left against mirrored right | axial | sheets | surfaces %D, mean, rms | medial points %D | over the surfaces' rms | over their mean | the same at the gap of both |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
+    let mut ratios: Vec<[f64; 4]> = Vec::new();
     for right in bones() {
         let name = right.to_string_lossy().into_owned();
         let left = PathBuf::from(name.replace("Right", "Left").replace("rfemur", "lfemur"));
@@ -152,18 +164,33 @@ fn mirrored(n: usize, settings: &RegulariseSettings) -> Result<(), Box<dyn Error
         let a = run(&sample(&target, n, 1), &target, settings)?;
         let b = run(&sample(&source, n, 2), &source, settings)?;
         let share = 50.0 / a.coarse.diagonal_mm;
-        let surfaces = share * (mean_distance(&target, &source) + mean_distance(&source, &target));
-        let medial = share * (medial_distance(&a.coarse, &b.coarse) + medial_distance(&b.coarse, &a.coarse));
+        let mean = share * (mean_distance(&target, &source) + mean_distance(&source, &target));
+        let rms = share * (rms_distance(&target, &source) + rms_distance(&source, &target));
+        let medial = |a, b| share * (medial_distance(a, b) + medial_distance(b, a));
+        let all = medial(&a.coarse, &b.coarse);
+        let gap = gap_of(&[&a.coarse, &b.coarse], NEAR);
+        let seen = medial(&a.coarse.view(gap), &b.coarse.view(gap));
+        let own = [all / rms, all / mean, seen / rms, seen / mean];
         let ([axial_a, sheets_a], [axial_b, sheets_b]) = (counts(&a.coarse), counts(&b.coarse));
         println!(
-            "| {} | {axial_a}, {axial_b} | {sheets_a}, {sheets_b} | {surfaces:.2} | {medial:.2} | {:.2} |",
+            "| {} | {axial_a}, {axial_b} | {sheets_a}, {sheets_b} | {mean:.2}, {rms:.2} | {all:.2} | {:.2} | {:.2} | {:.2}, {:.2} |",
             left.file_stem().unwrap_or_default().to_string_lossy(),
-            medial / surfaces
+            own[0],
+            own[1],
+            own[2],
+            own[3]
         );
-        ratios.push(medial / surfaces);
+        ratios.push(own);
     }
-    let mean = ratios.iter().sum::<f64>() / ratios.len().max(1) as f64;
-    println!("| mean of {} | | | | | {mean:.2} |", ratios.len());
+    let of = |k: usize| ratios.iter().map(|r| r[k]).sum::<f64>() / ratios.len().max(1) as f64;
+    println!(
+        "| mean of {} | | | | | {:.2} | {:.2} | {:.2}, {:.2} |",
+        ratios.len(),
+        of(0),
+        of(1),
+        of(2),
+        of(3)
+    );
     Ok(())
 }
 

@@ -6,8 +6,11 @@ use medial_scaffold::geometry::closest::ClosestOnMesh;
 use medial_scaffold::geometry::{Neighbours, TriangleMesh};
 
 /// Heading of the lines that [`Agreement::print`] writes.
-pub const HEADING: &str = "| variant | shapes | sheets change | axial change | the same over views of 1 to 2.5 tolerances | curves re-found | persistence change | same axial / all counts at the gap of the first | at the gap of both | medial distance %D | fidelity median / max (tau) | Betti = surface's |
-|---|---|---|---|---|---|---|---|---|---|---|---|";
+pub const HEADING: &str = "| variant | shapes | sheets change | axial change | the same over views of 1 to 2.5 tolerances | curves re-found | persistence change | same axial / all counts at the gap of the first | at the gap of both | the same up to 2.5 tolerances | medial distance %D | fidelity median / max (tau) | Betti = surface's |
+|---|---|---|---|---|---|---|---|---|---|---|---|---|";
+
+/// A gap is looked for up to this many tolerances.
+pub const NEAR: f64 = 1.8;
 
 /// Views that counts are compared over, in tolerances.
 const VIEWS: [f64; 9] = [1.0, 1.12, 1.26, 1.41, 1.58, 1.78, 2.0, 2.24, 2.5];
@@ -23,8 +26,9 @@ pub struct Agreement {
     kept: usize,
     found: usize,
     log_ratios: Vec<f64>,
-    /// At the gap of the first and at that of both: pairs with as many axial curves, and with as many sheets and nodes too.
-    same: [[usize; 2]; 2],
+    /// At the gap of the first, at that of both, and at that of both when it may be wider: pairs with as many axial curves, and with as
+    /// many sheets too.
+    same: [[usize; 2]; 3],
     medial: f64,
     fidelity: Vec<f64>,
     betti: usize,
@@ -66,10 +70,13 @@ impl Agreement {
                 self.log_ratios.push(ratio);
             }
         }
-        for (gap, same) in [gap_of(&[&a.coarse]), gap_of(&[&a.coarse, &b.coarse])]
-            .into_iter()
-            .zip(&mut self.same)
-        {
+        let both = [&a.coarse, &b.coarse];
+        let gaps = [
+            gap_of(&both[..1], NEAR),
+            gap_of(&both, NEAR),
+            gap_of(&both, VIEWS[8]),
+        ];
+        for (gap, same) in gaps.into_iter().zip(&mut self.same) {
             let [x, y] = [&a.coarse, &b.coarse].map(|s| counts(&s.view(gap)));
             same[0] += usize::from(x[0] == y[0]);
             same[1] += usize::from(x == y);
@@ -93,7 +100,7 @@ impl Agreement {
             v.get(v.len() / 2).copied().unwrap_or(0.0)
         };
         println!(
-            "| {name} | {} | {} | {} | {}, {} | {}/{} | {} | {} / {} % | {} / {} % | {:.2} | {:.2} / {:.2} | {}/{} |",
+            "| {name} | {} | {} | {} | {}, {} | {}/{} | {} | {} / {} % | {} / {} % | {} / {} % | {:.2} | {:.2} / {:.2} | {}/{} |",
             self.shapes,
             percent(self.sheets / n),
             percent(self.axial / n),
@@ -106,6 +113,8 @@ impl Agreement {
             share(self.same[0][1]),
             share(self.same[1][0]),
             share(self.same[1][1]),
+            share(self.same[2][0]),
+            share(self.same[2][1]),
             self.medial / n,
             median(&mut self.fidelity),
             self.fidelity.last().copied().unwrap_or(0.0),
@@ -135,10 +144,10 @@ pub fn distance_along(curve: &Curve, other: &Curve) -> f64 {
     sum / curve.polyline.len() as f64
 }
 
-/// The middle of the widest gap of the persistences of some scaffolds between one tolerance and 1.8.
-pub fn gap_of(scaffolds: &[&CoarseScaffold]) -> f64 {
+/// The middle of the widest gap that the persistences of some scaffolds leave between one tolerance and `most`.
+pub fn gap_of(scaffolds: &[&CoarseScaffold], most: f64) -> f64 {
     let tau = scaffolds[0].tolerance_mm;
-    let (lo, hi) = (tau, 1.8 * tau);
+    let (lo, hi) = (tau, most * tau);
     let mut p: Vec<f64> = scaffolds
         .iter()
         .flat_map(|s| axial(s))
@@ -171,6 +180,16 @@ fn medial_surface(s: &CoarseScaffold) -> TriangleMesh {
 
 /// Mean distance from one mesh to another, by area.
 pub fn mean_distance(from: &TriangleMesh, to: &TriangleMesh) -> f64 {
+    moment(from, to, |d| d)
+}
+
+/// Root mean square distance from one mesh to another, by area.
+pub fn rms_distance(from: &TriangleMesh, to: &TriangleMesh) -> f64 {
+    moment(from, to, |d| d * d).sqrt()
+}
+
+/// Mean of a function of the distance from one mesh to another, by area.
+fn moment(from: &TriangleMesh, to: &TriangleMesh, of: impl Fn(f64) -> f64) -> f64 {
     let Some(to) = ClosestOnMesh::new(to) else {
         return f64::NAN;
     };
@@ -189,7 +208,7 @@ pub fn mean_distance(from: &TriangleMesh, to: &TriangleMesh) -> f64 {
         .iter()
         .zip(&found)
         .zip(&weight)
-        .map(|((p, c), w)| w * p.distance(c.point))
+        .map(|((p, c), w)| w * of(p.distance(c.point)))
         .sum();
     sum / total
 }

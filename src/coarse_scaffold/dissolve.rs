@@ -81,43 +81,123 @@ pub(crate) fn join_curves(
             }
             continue;
         }
-        let second = curves[b].clone();
-        let mut second_edges = std::mem::take(&mut edges[b]);
-        let first = &mut curves[a];
-        if first.nodes[1] != node {
-            first.nodes.reverse();
-            first.polyline.reverse();
-            edges[a].reverse();
-        }
-        let mut tail = second.polyline;
-        let mut far = second.nodes;
-        if far[0] != node {
-            far.reverse();
-            tail.reverse();
-            second_edges.reverse();
-        }
-        first.polyline.extend(tail.into_iter().skip(1));
-        edges[a].extend(second_edges);
-        first.nodes[1] = far[1];
-        first.closed = first.nodes[0] == first.nodes[1];
-        first.length += second.length;
-        if second.persistence > first.persistence {
-            first.persistence = second.persistence;
-            // The order of the sheets is that of the most persistent place.
-            first.sheets = second.sheets;
-        }
-        gone[b] = true;
-        // The far end now belongs to the joined curve.
-        for slot in &mut at[far[1].index()] {
-            if *slot == b {
-                *slot = a;
-            }
-        }
+        join(curves, edges, &mut at, &mut gone, [a, b], node);
     }
     let mut keep = gone.iter().map(|g| !g);
     curves.retain(|_| keep.next().unwrap_or(true));
     let mut keep = gone.iter().map(|g| !g);
     edges.retain(|_| keep.next().unwrap_or(true));
+}
+
+/// Appends the second of two curves to the first at the node where both end. `at` are the curves at each node.
+fn join(
+    curves: &mut [Curve],
+    edges: &mut [Vec<u32>],
+    at: &mut [Vec<usize>],
+    gone: &mut [bool],
+    [a, b]: [usize; 2],
+    node: NodeId,
+) {
+    let second = curves[b].clone();
+    let mut second_edges = std::mem::take(&mut edges[b]);
+    let first = &mut curves[a];
+    if first.nodes[1] != node {
+        first.nodes.reverse();
+        first.polyline.reverse();
+        edges[a].reverse();
+    }
+    let mut tail = second.polyline;
+    let mut far = second.nodes;
+    if far[0] != node {
+        far.reverse();
+        tail.reverse();
+        second_edges.reverse();
+    }
+    first.polyline.extend(tail.into_iter().skip(1));
+    edges[a].extend(second_edges);
+    first.nodes[1] = far[1];
+    first.closed = first.nodes[0] == first.nodes[1];
+    first.length += second.length;
+    let mut others = second.sheets;
+    if second.persistence > first.persistence {
+        first.persistence = second.persistence;
+        // The order of the sheets is that of the most persistent place.
+        std::mem::swap(&mut first.sheets, &mut others);
+    }
+    others.retain(|s| !first.sheets.contains(s));
+    first.sheets.extend(others);
+    gone[b] = true;
+    // The far end now belongs to the joined curve.
+    for slot in &mut at[far[1].index()] {
+        if *slot == b {
+            *slot = a;
+        }
+    }
+}
+
+/// Joins axial curves that go on through a node where only ribs end beside them: two that share two sheets at least. What ends there
+/// beside them hung on something that is not shown, or the third sheet of each, a fin, stops short of the node: A1A3 ends that face each
+/// other and that a seam made one (merge A1A3-II). In the next sampling the curve runs through. The fins stay two sheets, both
+/// named by the joined curve; the ribs keep the node.
+pub(crate) fn join_facing(curves: &mut Vec<Curve>, nodes: usize) {
+    let mut at: Vec<Vec<usize>> = vec![Vec::new(); nodes];
+    for (i, c) in curves.iter().enumerate() {
+        for n in &c.nodes {
+            at[n.index()].push(i);
+        }
+    }
+    let kind = |c: usize| curves[c].kind;
+    let goes_on = |own: &[usize]| {
+        let axial: Vec<usize> = own
+            .iter()
+            .copied()
+            .filter(|&c| kind(c) == CurveKind::Axial)
+            .collect();
+        let &[a, b] = axial.as_slice() else { return false };
+        own.iter()
+            .all(|&c| matches!(kind(c), CurveKind::Axial | CurveKind::Rib))
+            && a != b
+            && shared(&curves[a].sheets, &curves[b].sheets) >= 2
+    };
+    let places: Vec<usize> = (0..nodes).filter(|&n| goes_on(&at[n])).collect();
+    let mut gone = vec![false; curves.len()];
+    let mut edges = vec![Vec::new(); curves.len()];
+    for n in places {
+        let axial: Vec<usize> = at[n]
+            .iter()
+            .copied()
+            .filter(|&c| curves[c].kind == CurveKind::Axial)
+            .collect();
+        // Curves that go on in a ring end in a loop through the last node.
+        if let &[a, b] = axial.as_slice()
+            && a != b
+        {
+            join(
+                curves,
+                &mut edges,
+                &mut at,
+                &mut gone,
+                [a, b],
+                NodeId::from_index(n),
+            );
+            at[n].retain(|&c| c != a && c != b);
+        }
+    }
+    let mut keep = gone.iter().map(|g| !g);
+    curves.retain(|_| keep.next().unwrap_or(true));
+}
+
+/// How many entries two lists share, each entry of one with one of the other.
+fn shared(first: &[SheetId], second: &[SheetId]) -> usize {
+    let mut left = second.to_vec();
+    let with = |s: &&SheetId| match left.iter().position(|t| t == *s) {
+        Some(k) => {
+            left.swap_remove(k);
+            true
+        }
+        None => false,
+    };
+    first.iter().filter(with).count()
 }
 
 #[cfg(test)]

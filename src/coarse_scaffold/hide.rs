@@ -3,8 +3,9 @@
 //! the complex, so that homotopy type and surface are kept, but they are no elements of the graph, whose elements would
 //! otherwise come and go with the sampling.
 //!
-//! 1. whiskers: wires with a free tip that hang on a sheet and are no longer than one and a half seams;
-//! 2. axial curves of less persistence than the cut, the least persistent first. The sheets along a curve that is hidden are one
+//! 1. the spines of the regularisation;
+//! 2. whiskers: wires with a free tip that hang on a sheet and are no longer than one and a half seams;
+//! 3. axial curves of less persistence than the cut, the least persistent first. The sheets along a curve that is hidden are one
 //!    sheet, and the curves on both sides of its ends become one where nothing else ends there, with the larger persistence.
 //!
 //! Cost `O(n)` for each curve hidden.
@@ -20,6 +21,9 @@ use crate::regularise::{Event, Kind};
 pub(crate) fn hide(network: &mut Network, settings: &CoarseScaffoldSettings) {
     if !network.regularised.cut.is_finite() || network.regularised.cut <= 0.0 {
         return;
+    }
+    for &e in &network.regularised.spines {
+        network.hidden[e as usize] = true;
     }
     // A whisker that forks is hidden branch by branch.
     loop {

@@ -7,13 +7,15 @@
 //! 2. axial curves, wires and seams below it go; of the three sheets at an axial curve that went, the two of highest erosion thickness become
 //!    one and the third is one with them only where nothing else holds it; what a sheet that went stood for (volume, generators)
 //!    falls to the sheet it hung on by its most persistent curve;
-//! 3. nodes that no curve ends at go; where just two curves of one kind are left, they become one.
+//! 3. nodes that no curve ends at go; where just two curves of one kind are left, they become one; so do two axial curves of two
+//!    shared sheets where only ribs end beside them: whether a curve runs through there or in two pieces is decided below the
+//!    tolerance of a view, and differs from sampling to sampling.
 //!
 //! Cost: `O(elements log elements)`.
 
 use super::attributes::{boundaries, principal};
 use super::build::{node_kind, node_persistence};
-use super::dissolve::join_curves;
+use super::dissolve::{join_curves, join_facing};
 use super::hypergraph::{CoarseScaffold, Curve, CurveKind, FineLinks, Node, Sheet};
 use super::natural::natural_tolerances;
 use crate::geometry::mesh::DisjointSets;
@@ -53,7 +55,10 @@ impl CoarseScaffold {
                 ..c.clone()
             })
             .collect();
-        join_curves(&mut curves, &mut Vec::new(), self.nodes.len(), |_, _| true);
+        join_facing(&mut curves, self.nodes.len());
+        join_curves(&mut curves, &mut Vec::new(), self.nodes.len(), |a, b| {
+            a.kind != CurveKind::Rib || a.sheets == b.sheets
+        });
         let nodes = renumber(&mut curves, &self.nodes, &self.curves, sheets.is_empty());
         boundaries(&mut sheets, &curves);
         CoarseScaffold {

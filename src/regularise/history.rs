@@ -27,6 +27,8 @@ pub enum Kind {
     Restore,
     /// A short path between the end of an axial curve and a rib declared a border between sheets.
     Seam,
+    /// Paths of single edges grown back for the generators farthest from the medial balls; no elements of the graph.
+    Spines,
     /// A short curve shrunk to a node (transitions A1^5 and A1^2A3-I).
     ContractCurve,
     /// A small sheet shrunk to a node (transition A1^5).

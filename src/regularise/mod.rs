@@ -10,7 +10,8 @@
 //! 5. [`grow`]: survivors grow back across their ribs and from their tips; [`fringe`]s are trimmed;
 //! 6. small remnants and [`wires`] go;
 //! 7. [`fidelity`]: what moves the surface by more than the tolerance is brought back;
-//! 8. [`seams`]: gaps at the ends of axial curves become borders.
+//! 8. [`seams`]: gaps at the ends of axial curves become borders;
+//! 9. [`spines`]: single edges grow back to the balls that the farthest generators need.
 //!
 //! Every change is an elementary collapse or expansion ([`complex`]), and the Betti numbers are checked after every stage all the
 //! same. After Chang & Kimia, "Regularizing 3D medial axis using medial scaffold transforms" (2008), with lengths for
@@ -31,6 +32,7 @@ pub(crate) mod measure;
 pub(crate) mod queue;
 pub(crate) mod seams;
 pub mod settings;
+pub(crate) mod spines;
 pub(crate) mod splice;
 pub mod stages;
 pub(crate) mod wires;

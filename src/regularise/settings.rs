@@ -59,6 +59,11 @@ pub struct RegulariseSettings {
     /// samplings of 25 bones the number of sheets changes by 12 % with 4.5, 15 % with 4, 21 % with 2.5 where the scaffold is thin and
     /// none elsewhere.
     pub seam_length: f64,
+    /// Generators farther than this many tolerances from every medial ball get a spine to a ball that comes nearer; see
+    /// [`Regularised::spines`](super::Regularised::spines). 1 for none: what is within the tolerance may stay away.
+    pub spine_from: f64,
+    /// Longest spine, in tolerances.
+    pub spine_length: f64,
     /// With [`Cost::Count`]: sheets with fewer generators than this are spliced.
     pub count_threshold: u32,
 }
@@ -80,6 +85,8 @@ impl Default for RegulariseSettings {
             rounds: 3,
             wire: 1.15,
             seam_length: 4.5,
+            spine_from: 0.55,
+            spine_length: 20.0,
             count_threshold: 100,
         }
     }
@@ -144,6 +151,8 @@ impl RegulariseSettings {
         positive("fringe_width", self.fringe_width)?;
         positive("fringe_erosion", self.fringe_erosion)?;
         positive("wire", self.wire)?;
-        positive("seam_length", self.seam_length)
+        positive("seam_length", self.seam_length)?;
+        positive("spine_from", self.spine_from)?;
+        positive("spine_length", self.spine_length)
     }
 }

@@ -13,6 +13,7 @@ use super::history::{Event, Kind};
 use super::measure::{Measure, Tolerance};
 use super::seams::find_seams;
 use super::settings::{Cost, RegulariseError, RegulariseSettings};
+use super::spines::{Spines, grow_spines};
 use super::splice::Splicer;
 use super::wires::{remove_small_wires, remove_whiskers, whiskers};
 use crate::fine_scaffold::{Betti, FineScaffold};
@@ -39,6 +40,9 @@ pub struct Regularised {
     pub wire_erosion_mm: Vec<f64>,
     /// Seams as paths of edges, each from the end of an axial curve.
     pub seams: Vec<Vec<u32>>,
+    /// Edges of the spines: paths from the sheets to single balls that generators far from all others need. They belong to the
+    /// complex and to no element of the graph.
+    pub spines: Vec<u32>,
     /// Every elementary step in order; [`super::replay`] makes `alive` of it.
     pub log: Vec<Step>,
     /// What was done, in order, with costs.
@@ -99,11 +103,13 @@ pub fn regularise(
     let mut cover = Cover::new(&run.complex, &run.measure, None);
     run.simplify(&mut cover);
     run.checked("splice and trim")?;
-    let nearest = run.grow_within_tolerance(&cover);
+    let mut nearest = run.grow_within_tolerance(&cover);
     run.checked("grow back")?;
     let seams = find_seams(&run.complex, &run.measure, settings, &mut run.history);
+    let spines = run.grow_spines(&cover, &mut nearest);
+    run.checked("spines")?;
     let fidelity = Fidelity::of(&nearest.distance_mm, &cover);
-    Ok(run.finish(seams, fidelity, nearest.vertex))
+    Ok(run.finish(seams, spines, fidelity, nearest.vertex))
 }
 
 struct Run<'a> {
@@ -304,7 +310,28 @@ impl<'a> Run<'a> {
         fidelity::nearest(&self.complex, &tree, cover)
     }
 
-    fn finish(self, seams: Vec<Vec<u32>>, fidelity: Fidelity, nearest_vertex: Vec<u32>) -> Regularised {
+    /// Spines for the generators farthest from the balls; where costs are counts no length says which those are.
+    fn grow_spines(&mut self, cover: &Cover, nearest: &mut Nearest) -> Vec<u32> {
+        let mut edges = Vec::new();
+        if self.settings.cost == Cost::Length {
+            let spines = Spines {
+                from: self.settings.spine_from,
+                longest: self.settings.spine_length,
+            };
+            self.stage(Kind::Spines, |run| {
+                edges = grow_spines(&mut run.complex, &run.measure, cover, spines, nearest);
+            });
+        }
+        edges
+    }
+
+    fn finish(
+        self,
+        seams: Vec<Vec<u32>>,
+        spines: Vec<u32>,
+        fidelity: Fidelity,
+        nearest_vertex: Vec<u32>,
+    ) -> Regularised {
         let tolerance_mm = self.largest_tolerance();
         let wire_erosion_mm = (0..self.fine.num_vertices() as u32)
             .map(|v| self.fire.erosion(&self.complex, v).unwrap_or(f64::NAN))
@@ -315,6 +342,7 @@ impl<'a> Run<'a> {
             erosion_mm: self.erosion,
             wire_erosion_mm,
             seams,
+            spines,
             log,
             history: self.history,
             betti: self.betti,
