@@ -6,6 +6,7 @@
 mod segregation_support;
 
 use glam::DVec3;
+use medial_scaffold::fine_scaffold::{Domain, Side, fine_scaffold_of};
 use medial_scaffold::geometry::TriangleMesh;
 use medial_scaffold::segregation::{KnownSurfaceSettings, RefinedSegregation, segregate_known_refined};
 use segregation_support::{cuboid, data_shape, sample, sphere, torus};
@@ -46,6 +47,22 @@ fn assert_right(name: &str, found: &RefinedSegregation, eulers: &[i64], spacing:
         "{name}"
     );
     moved
+}
+
+/// No vertex of the scaffold lies farther from the shape than the shape is large: circumcentres of the flat tetrahedra that join
+/// the pieces of a blade lie up to 10^14 times as far.
+fn assert_nothing_flies_off(surface: &TriangleMesh, found: &RefinedSegregation) {
+    let domain = Domain::new(&found.triangulation, &found.result.segregation, Side::Interior)
+        .expect("a closed surface has an inside");
+    let fine = fine_scaffold_of(&found.triangulation, &domain).expect("an inside has a scaffold");
+    let [lo, hi] = surface.bounds().expect("a mesh with points");
+    let (middle, reach) = ((lo + hi) / 2.0, (hi - lo).length());
+    let farthest = fine
+        .vertex_position
+        .iter()
+        .map(|p| p.distance(middle))
+        .fold(0.0, f64::max);
+    assert!(farthest < reach, "a vertex {} diagonals away", farthest / reach);
 }
 
 fn spacing(surface: &TriangleMesh, found: &RefinedSegregation) -> f64 {
@@ -127,6 +144,7 @@ fn a_blade_is_one_piece_to_its_edge() {
             spacing(&surface, &found),
         );
         println!("{angle} degrees: moved by {moved:.2e}");
+        assert_nothing_flies_off(&surface, &found);
     }
 }
 

@@ -14,7 +14,8 @@
 //! in parallel over tetrahedra with results kept in order.
 //!
 //! Degenerate input: flat tetrahedra have circumcentres far away or none; a vertex without a finite circumcentre is an
-//! error, because no later stage could place it.
+//! error, because no later stage could place it. One whose circumcentre is on the other side and farther off than the tetrahedron is long is
+//! put at the centroid: labels that close a surface or mend its topology need such tetrahedra, and their circumcentres say nothing.
 
 use super::complex::{FineScaffold, NONE};
 use super::domain::Domain;
@@ -145,16 +146,19 @@ pub fn fine_scaffold_of(
             side: domain.side(),
         });
     }
-    let balls = circumballs(triangulation, &dual.tets)?;
+    let mut balls = circumballs(triangulation, &dual.tets)?;
     let edges = edges(triangulation, domain, &dual);
     let facets = facets(triangulation, domain, &dual, &edges.of_vertex);
     let (edge_facet_start, edge_facets) = incidence(edges.vertices.len(), &facets.start, &facets.ring_edges);
     let cells = cells(triangulation, domain, &facets.generators);
     let (generator_region, num_regions) = regions(triangulation, domain);
-    let outside = (0..dual.tets.len())
+    let outside: Vec<bool> = (0..dual.tets.len())
         .into_par_iter()
         .map(|v| !circumcentre_is_of_side(triangulation, domain, dual.tets[v], balls[v].centre))
         .collect();
+    for v in (0..balls.len()).filter(|&v| outside[v]) {
+        hold_near(triangulation.corners(dual.tets[v]), &mut balls[v]);
+    }
     Ok(FineScaffold {
         scale: scale(triangulation, domain),
         generator_position: triangulation.points.clone(),
@@ -209,6 +213,22 @@ fn circumballs(triangulation: &Triangulation, tets: &[TetId]) -> Result<Vec<Sphe
             tet: tets[v],
             generators: triangulation.tet(tets[v]),
         }),
+    }
+}
+
+/// Keeps the ball of a flat tetrahedron, labelled against its circumcentre, from flying off: when its radius is more than the
+/// longest edge, the centroid takes the centre's place, with the largest ball that holds no corner.
+fn hold_near(corners: [DVec3; 4], ball: &mut Sphere) {
+    let longest = (1..4)
+        .flat_map(|i| (0..i).map(move |j| (i, j)))
+        .map(|(i, j)| corners[i].distance(corners[j]))
+        .fold(0.0, f64::max);
+    if ball.radius > longest {
+        ball.centre = corners.iter().sum::<DVec3>() / 4.0;
+        ball.radius = corners
+            .iter()
+            .map(|c| c.distance(ball.centre))
+            .fold(f64::INFINITY, f64::min);
     }
 }
 

@@ -52,7 +52,7 @@ pub struct FineScaffold {
     pub generator_region: Vec<u32>,
     /// Number of components of the complement, those of 3-cells included.
     pub num_regions: u32,
-    /// Position of each vertex: the circumcentre of its tetrahedron, mm.
+    /// Position of each vertex: the circumcentre of its tetrahedron, mm (its centroid where the circumcentre is far on the other side).
     pub vertex_position: Vec<DVec3>,
     /// Radius of each vertex: the circumradius, mm.
     pub vertex_radius: Vec<f64>,

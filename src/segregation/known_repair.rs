@@ -63,6 +63,8 @@ pub(super) struct KnownRepair {
     pub agrees: bool,
     /// Where labels were changed, the farthest first.
     pub places: Vec<RepairedPlace>,
+    /// `sqrt(area / generators)`, mm.
+    pub spacing_mm: f64,
 }
 
 /// Changes labels until they have the surface's topology; see the module.
@@ -92,6 +94,7 @@ pub(super) fn repair_topology(
         places: repair.places(&inside),
         agrees,
         inside,
+        spacing_mm,
     }
 }
 

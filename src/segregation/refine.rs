@@ -77,15 +77,16 @@ pub fn segregate_known_refined(
 }
 
 /// What a user should know of a repair; nothing when nothing moved.
-fn moved_in_words(places: &[RepairedPlace]) -> Option<String> {
+fn moved_in_words(places: &[RepairedPlace], spacing_mm: f64) -> Option<String> {
     let worst = places.first()?;
     let [x, y, z] = worst.place.to_array();
     Some(format!(
-        "the shape is thinner than its sampling in {} {}; the surface was moved there, by at most {:.2e} mm, at ({x:.4}, {y:.4}, {z:.4}), \
-         so that its topology is right",
+        "the shape is thinner than its sampling in {} {}; the surface was moved there, by at most {:.4} mm ({:.1} spacings), at \
+         ({x:.4}, {y:.4}, {z:.4}), so that its topology is right",
         places.len(),
         if places.len() == 1 { "place" } else { "places" },
-        worst.moved_mm
+        worst.moved_mm,
+        worst.moved_mm / spacing_mm
     ))
 }
 
@@ -108,11 +109,13 @@ impl RefinedSegregation {
         segregation.warnings.clear();
         if repair.agrees {
             report.needs_refinement.clear();
-            segregation.warnings.extend(moved_in_words(&report.repaired));
+            segregation
+                .warnings
+                .extend(moved_in_words(&report.repaired, repair.spacing_mm));
         } else {
             segregation.warnings.push(format!(
-                "the surface found has {}, the one given {}: it is thinner than the sampling in many places, and refinement (best after {} \
-                 rounds and {} added points) did not resolve them; a finer --spacing may",
+                "the surface found has {}, the one given {}: its parts cross each other or it is thinner than the sampling in many places; refinement (best after {} \
+                 rounds and {} added points) did not resolve that, a finer --spacing may",
                 eulers_in_words(&report.found_euler),
                 eulers_in_words(&report.expected_euler),
                 self.rounds,
