@@ -27,6 +27,15 @@ fn a_missing_file_and_an_unknown_option_exit_2() {
     assert!(stderr(&medial(&["check", "no-such-file.ply"])).contains("no-such-file.ply"));
 }
 
+#[test]
+fn folders_without_names_are_told_of_names() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().to_str().expect("a path of text");
+    let out = medial(&["match", path, path, "--json"]);
+    assert_eq!(out.status.code(), Some(2));
+    assert!(stderr(&out).contains("--names"), "{}", stderr(&out));
+}
+
 /// Each damaged file must end in exit 2 and a message that names the file, for every command that reads it.
 #[test]
 fn damaged_files_exit_2_and_are_named() {

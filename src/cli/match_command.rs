@@ -108,6 +108,11 @@ pub fn run(args: &MatchArgs, common: &Common) -> Result<Verdict, Failure> {
     if args.names {
         return super::names::run(args, common);
     }
+    if args.target.is_dir() && args.source.is_dir() {
+        return Err(Failure::usage(
+            "TARGET and SOURCE are folders; --names says which shape of one is which of the other, else give a file of each",
+        ));
+    }
     let target = common.read(&args.target)?;
     let source = common.read(&args.source)?;
     let settings = args.options.settings(common);

@@ -72,6 +72,7 @@ pub fn read_shape(path: &Path, settings: &ReadSettings) -> Result<Shape, ReadErr
         let remedy = match e.kind() {
             std::io::ErrorKind::NotFound => "check the name and the folder",
             std::io::ErrorKind::PermissionDenied => "check that you may read it",
+            std::io::ErrorKind::IsADirectory => "give the path of one of its files",
             _ => "give the path of a file that can be read",
         };
         Flaw::file(Fault::Unreadable, format!("cannot be read ({e})"), remedy).in_file(path)
@@ -417,7 +418,7 @@ fn usable_points(points: &[DVec3]) -> Result<(), Flaw> {
                     index: i as u64,
                 },
                 Fault::Number,
-                format!("its coordinates are {}, {}, {} mm", p.x, p.y, p.z),
+                format!("its coordinates are {:e}, {:e}, {:e} mm", p.x, p.y, p.z),
                 format!(
                     "coordinates must stay within {LARGEST_MM:e} mm: check the units, or mend that point"
                 ),
