@@ -6,7 +6,7 @@
 //! Truth is the least-squares motion of corresponding points; for rigid rows that is the motion itself, and where one end grew
 //! it is the motion of what did not. Columns: rotation within 5 degrees;
 //! within 20 degrees (the right basin: what is asked of shapes that differ); median and worst angle; median distance of corresponding points under the found pose above that under the true one, percent of
-//! the diagonal; wrong and right answers called ambiguous.
+//! the diagonal; wrong and right answers flagged, as ambiguous or uncertain.
 
 use datasets_synthetic::bones;
 use datasets_synthetic::deform::crop::{crop_half_spaces, random_direction, remove_ball, visible_from};
@@ -29,8 +29,8 @@ enum Change {
     Bend(f64),
     /// Size, with the similarity option.
     Size(f64),
-    /// A swelling of one end: how far the surface moves at most, share of the diagonal.
-    Growth(f64),
+    /// A swelling of one end: its width, and how far the surface moves at most, shares of the diagonal.
+    Growth(f64, f64),
     /// A ball taken out, share of the diagonal.
     Missing(f64),
     /// Cut by three planes to a share.
@@ -43,7 +43,7 @@ enum Change {
     Density(f64),
 }
 
-const ROWS: [(&str, Change); 21] = [
+const ROWS: [(&str, Change); 23] = [
     ("re-sampled", Change::Nothing),
     ("noise 0.5 spacing", Change::Noise(0.5)),
     ("noise 1 spacing", Change::Noise(1.0)),
@@ -54,8 +54,10 @@ const ROWS: [(&str, Change); 21] = [
     ("bend 0.2", Change::Bend(0.2)),
     ("size 0.8", Change::Size(0.8)),
     ("size 1.2", Change::Size(1.2)),
-    ("growth 5 %", Change::Growth(0.05)),
-    ("growth 10 %", Change::Growth(0.1)),
+    ("growth 5 %", Change::Growth(0.15, 0.05)),
+    ("growth 10 %", Change::Growth(0.15, 0.1)),
+    ("local growth 5 %", Change::Growth(0.08, 0.05)),
+    ("local growth 10 %", Change::Growth(0.08, 0.1)),
     ("missing ball 15 %", Change::Missing(0.15)),
     ("three cuts to 60 %", Change::Cuts(0.6)),
     ("three cuts to 40 %", Change::Cuts(0.4)),
@@ -72,7 +74,7 @@ fn main() {
     let most = args.iter().find_map(|a| a.parse().ok()).unwrap_or(8);
     let rows: Vec<&String> = args.iter().filter(|a| a.parse::<usize>().is_err()).collect();
     println!(
-        "| change of the source | bones | within 5 deg | within 20 deg | median deg | worst deg | extra distance % diag | wrong, ambiguous | right, ambiguous |"
+        "| change of the source | bones | within 5 deg | within 20 deg | median deg | worst deg | extra distance % diag | wrong, flagged | right, flagged |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
     for (name, change) in ROWS {
@@ -106,7 +108,7 @@ fn row(name: &str, change: Change, most: usize) {
         let before = shape.sample_uniform(1000, seed + 7).points;
         let after: Vec<DVec3> = before.iter().map(|&p| motion.apply(warp.apply(p))).collect();
         let truth = match change {
-            Change::Growth(_) => motion.inverse(),
+            Change::Growth(..) => motion.inverse(),
             _ => least_squares(&after, &before, matches!(change, Change::Size(_))),
         };
         let settings = RegistrationSettings {
@@ -129,23 +131,25 @@ fn row(name: &str, change: Change, most: usize) {
             100.0 * sum / before.len() as f64 / diagonal
         };
         extra.push(distance(&found.T_target_source) - distance(&truth));
+        let flagged = found.ambiguous || found.uncertain;
         if error < 5.0 {
-            right_flagged += usize::from(found.ambiguous);
-            if found.ambiguous {
+            right_flagged += usize::from(flagged);
+            if flagged {
                 println!(
-                    "<!-- {name}, {}: right, {:?}, {:?} -->",
-                    shape.name, found.method, found.ambiguity
+                    "<!-- {name}, {}: right, {:?}, {:?} {:?} -->",
+                    shape.name, found.method, found.ambiguity, found.uncertainty
                 );
             }
         } else {
-            wrong_flagged += usize::from(found.ambiguous);
+            wrong_flagged += usize::from(flagged);
             println!(
-                "<!-- {name}, {} {k}: {error:.1} degrees, {:?}, standard error {:.1}, score {:.3}, {:?} -->",
+                "<!-- {name}, {} {k}: {error:.1} degrees, {:?}, standard error {:.1}, score {:.3}, {:?} {:?} -->",
                 shape.name,
                 found.method,
                 found.precision.map_or(f64::NAN, |p| p.rotation_deg),
                 found.score,
-                found.ambiguity
+                found.ambiguity,
+                found.uncertainty
             );
         }
         errors.push(error);
@@ -171,9 +175,9 @@ fn warp_of(change: Change, shape: &Shape, seed: u64) -> Warp {
         Change::Warp(share) => Warp::random_smooth(&bounds, share * diagonal, seed),
         Change::Bend(turn) => Warp::bend_x(turn / diagonal),
         Change::Size(factor) => Warp::scale(factor),
-        Change::Growth(share) => {
+        Change::Growth(width, share) => {
             let end = bounds.centre() + 0.4 * bounds.size() * DVec3::X;
-            swelling(end, 0.15 * diagonal, share * diagonal)
+            swelling(end, width * diagonal, share * diagonal)
         }
         _ => Warp::identity(),
     }

@@ -1,7 +1,8 @@
 //! Prints how often, how precisely and how fast `register` finds the pose of real bones.
 //!
 //! `cargo run --release --example registration_table -- [TRIALS] [CASE...] [each] [from N]` with the bones of `../shared/data` (or of the folder
-//! in `MEDIAL_DATA`); cases: whole, crop50, crop50-low, crop50-high, overlap33, overlap20, one55, one35, one25, mesh, mirror.
+//! in `MEDIAL_DATA`); cases: whole, crop50, crop50-low, crop50-high, overlap33, overlap20, one55, one35, one25,
+//! size55, size35, size25, size-crop50 (the same cuts with the source 0.8 to 1.2 times as large), mesh, mirror.
 //! `... -- TRIALS dump FOLDER CASE...` writes the clouds of the trials, raw and de-noised, for `compare/registration.py`.
 //! `from N` starts with trial N instead of trial 0 (other cuts, noise and poses of the same bones);
 //! `each` prints the error of every trial as well, with the standard error that was reported.
@@ -24,53 +25,88 @@ struct Case {
     keep: [f64; 2],
     /// Noise, percent of the diagonal.
     noise: f64,
+    /// The source's size is unknown: a factor of 0.8 to 1.2, found with `scale`.
+    sized: bool,
 }
 
-const CASES: [Case; 9] = [
+const CASES: [Case; 13] = [
     Case {
         name: "whole",
         keep: [1.0, 1.0],
         noise: 1.0,
+        sized: false,
     },
     Case {
         name: "crop50",
         keep: [2.0 / 3.0, 2.0 / 3.0],
         noise: 1.0,
+        sized: false,
     },
     Case {
         name: "crop50-low",
         keep: [2.0 / 3.0, 2.0 / 3.0],
         noise: 0.2,
+        sized: false,
     },
     Case {
         name: "crop50-high",
         keep: [2.0 / 3.0, 2.0 / 3.0],
         noise: 2.0,
+        sized: false,
     },
     Case {
         name: "overlap33",
         keep: [0.6, 0.6],
         noise: 1.0,
+        sized: false,
     },
     Case {
         name: "overlap20",
         keep: [1.0 / 1.8, 1.0 / 1.8],
         noise: 1.0,
+        sized: false,
     },
     Case {
         name: "one55",
         keep: [1.0, 0.55],
         noise: 1.0,
+        sized: false,
     },
     Case {
         name: "one35",
         keep: [1.0, 0.35],
         noise: 1.0,
+        sized: false,
     },
     Case {
         name: "one25",
         keep: [1.0, 0.25],
         noise: 1.0,
+        sized: false,
+    },
+    Case {
+        name: "size55",
+        keep: [1.0, 0.55],
+        noise: 1.0,
+        sized: true,
+    },
+    Case {
+        name: "size35",
+        keep: [1.0, 0.35],
+        noise: 1.0,
+        sized: true,
+    },
+    Case {
+        name: "size25",
+        keep: [1.0, 0.25],
+        noise: 1.0,
+        sized: true,
+    },
+    Case {
+        name: "size-crop50",
+        keep: [2.0 / 3.0, 2.0 / 3.0],
+        noise: 1.0,
+        sized: true,
     },
 ];
 
@@ -109,9 +145,9 @@ fn main() {
         bones.len()
     );
     println!(
-        "| case | noise % | success | median deg | wrong, flagged | right, flagged | rms of error / standard error | median s | max s |"
+        "| case | noise % | success | median deg | median size error % | wrong, flagged | right, flagged | rms of error / standard error | within two | median s | max s |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
     for case in &CASES {
         if chosen.is_empty() || chosen.iter().any(|c| *c == case.name) {
             run(case, &bones, first, trials);
@@ -131,6 +167,8 @@ struct Trial<'a> {
     target: Vec<DVec3>,
     source: Vec<DVec3>,
     motion: Rigid,
+    /// Size of the source as a factor of the bone's; part of `motion`.
+    size: f64,
 }
 
 fn make<'a>(case: &Case, bones: &'a [Bone], trial: usize) -> Trial<'a> {
@@ -140,13 +178,20 @@ fn make<'a>(case: &Case, bones: &'a [Bone], trial: usize) -> Trial<'a> {
     let axis = random_direction(&mut rng);
     let target = cut(noisy(&bone.mesh, 4000, sigma, &mut rng), axis, case.keep[0]);
     let source = cut(noisy(&bone.mesh, 2000, sigma, &mut rng), -axis, case.keep[1]);
-    let motion = random_motion(&mut rng, bone.mesh.diagonal_mm());
+    let mut motion = random_motion(&mut rng, bone.mesh.diagonal_mm());
+    let size = if case.sized {
+        rng.random_range(0.8..1.2)
+    } else {
+        1.0
+    };
+    motion.linear *= size;
     let source: Vec<DVec3> = source.iter().map(|&p| motion.apply(p)).collect();
     Trial {
         bone,
         target,
         source,
         motion,
+        size,
     }
 }
 
@@ -179,49 +224,70 @@ fn run(case: &Case, bones: &[Bone], first: usize, trials: usize) {
     let mut errors = Vec::new();
     // Error over standard error, of the right ones.
     let mut normed = Vec::new();
+    // Of the size, percent.
+    let mut size_errors = Vec::new();
     let mut each = String::new();
     let mut seconds = Vec::new();
     let (mut wrong_flagged, mut wrong, mut right_flagged) = (0, 0, 0);
+    let mut uncertain = 0;
     for trial in first..first + trials {
         let Trial {
             bone,
             target,
             source,
             motion,
+            size,
         } = make(case, bones, trial);
         let clock = Instant::now();
         let found = register(
             &RegistrationShape::cloud(&target),
             &RegistrationShape::cloud(&source),
-            &RegistrationSettings::default(),
+            &RegistrationSettings {
+                scale: case.sized,
+                ..Default::default()
+            },
         )
         .expect("the clouds are sound");
         seconds.push(clock.elapsed().as_secs_f64());
         let error = found.T_target_source.rotation_angle_deg(&motion.inverse());
         errors.push(error);
-        let standard = found.precision.map_or(f64::NAN, |p| p.rotation_deg);
-        each += &format!(" {error:.2}({standard:.2})");
+        let standard = found.precision.as_ref().map_or(f64::NAN, |p| p.rotation_deg);
+        let flagged = found.ambiguous || found.uncertain;
+        let flag = if flagged { "!" } else { "" };
+        each += &format!(" {error:.2}({standard:.2}){flag}");
+        if case.sized {
+            size_errors.push(100.0 * (found.scale * size - 1.0).abs());
+            let told = found.precision.as_ref().and_then(|p| p.scale_percent);
+            each += &format!(
+                "[{:.1}%({:.1})]",
+                100.0 * (found.scale * size - 1.0),
+                told.unwrap_or(f64::NAN)
+            );
+        }
         if error < 5.0 {
             normed.push(error / standard);
         }
         if error >= 5.0 {
             wrong += 1;
-            wrong_flagged += usize::from(found.ambiguous);
+            wrong_flagged += usize::from(flagged);
             println!(
-                "<!-- {} trial {trial} {}: {error:.2} degrees, ambiguous {}, {:?} score {:.3} {:?} -->",
+                "<!-- {} trial {trial} {}: {error:.2} degrees, flagged {}, {:?} score {:.3} {:?} standard error {standard:.2} {:?} {:?} -->",
                 case.name,
                 bone.name,
-                found.ambiguous,
+                flagged,
                 found.method,
                 found.score,
                 found
                     .hypotheses
                     .iter()
                     .map(|h| (h.score * 1000.0).round() / 1000.0)
-                    .collect::<Vec<_>>()
+                    .collect::<Vec<_>>(),
+                found.ambiguity,
+                found.uncertainty
             );
         } else {
-            right_flagged += usize::from(found.ambiguous);
+            right_flagged += usize::from(flagged);
+            uncertain += usize::from(!found.ambiguous && found.uncertain);
         }
     }
     if std::env::args().any(|a| a == "each") {
@@ -230,13 +296,19 @@ fn run(case: &Case, bones: &[Bone], first: usize, trials: usize) {
     errors.sort_by(f64::total_cmp);
     seconds.sort_by(f64::total_cmp);
     let normed_rms = (normed.iter().map(|x: &f64| x * x).sum::<f64>() / normed.len().max(1) as f64).sqrt();
+    let within = normed.iter().filter(|x| **x <= 2.0).count();
+    size_errors.sort_by(f64::total_cmp);
+    let size_error = size_errors
+        .get(trials / 2)
+        .map_or(String::new(), |e| format!("{e:.1}"));
     println!(
-        "| {} | {} | {}/{trials} | {:.3} | {wrong_flagged}/{wrong} | {right_flagged}/{} | {normed_rms:.2} | {:.2} | {:.2} |",
+        "| {} | {} | {}/{trials} | {:.3} | {size_error} | {wrong_flagged}/{wrong} | {right_flagged}/{} ({uncertain} only uncertain) | {normed_rms:.2} | {within}/{} | {:.2} | {:.2} |",
         case.name,
         case.noise,
         trials - wrong,
         errors[trials / 2],
         trials - wrong,
+        normed.len(),
         seconds[trials / 2],
         seconds[trials - 1],
     );

@@ -307,7 +307,7 @@ fn errors_are_as_large_as_their_standard_errors() {
             &RegistrationSettings::default(),
         )
         .expect("sound clouds");
-        let precision = found.precision.expect("whole shapes share enough");
+        let precision = found.precision.as_ref().expect("whole shapes share enough");
         squares += (error_deg(&found, &motion) / precision.rotation_deg).powi(2);
     }
     let ratio = (squares / 12.0).sqrt();
@@ -332,6 +332,59 @@ fn a_fragment_finds_its_place_on_the_whole() {
     .expect("sound shapes");
     assert!(error_deg(&found, &motion) < 1.5, "{}", error_deg(&found, &motion));
     assert!(found.overlap > 0.95 && found.overlap_target < 0.7);
+}
+
+/// Two fifths of a shape of another size: the size of a piece is not that of its outline.
+#[test]
+fn a_fragment_of_unknown_size_finds_its_place_and_its_size() {
+    let shape = lump(1.0);
+    for (seed, size) in [(33, 0.84), (34, 1.17)] {
+        let motion = motion(seed);
+        let source = cut(&cloud(&shape, 3000, 0.1, seed), DVec3::new(1.0, 0.4, -0.3), 0.4);
+        let source: Vec<DVec3> = source.iter().map(|&p| motion.apply(p * size)).collect();
+        let settings = RegistrationSettings {
+            scale: true,
+            ..Default::default()
+        };
+        let (target, source) = (RegistrationShape::mesh(&shape), RegistrationShape::cloud(&source));
+        let found = register(&target, &source, &settings).expect("sound shapes");
+        assert!(error_deg(&found, &motion) < 1.5, "{}", error_deg(&found, &motion));
+        assert!((found.scale * size - 1.0).abs() < 0.02, "{}", found.scale * size);
+        assert!(!found.ambiguous, "{:?}", found.ambiguity);
+        let told = found
+            .precision
+            .and_then(|p| p.scale_percent)
+            .expect("a size was fitted");
+        assert!((0.0..5.0).contains(&told), "{told}");
+    }
+}
+
+/// What a shape cannot tell is said, and the loosest axis comes first.
+#[test]
+fn a_pose_that_can_spin_says_about_which_axis() {
+    // A spindle: only the turn about its long axis is free.
+    let spindle = star(|d| DVec3::new(d.x / 14.0, d.y / 6.0, d.z / 6.0).length().recip() + 0.8 * d.x);
+    let motion = motion(35);
+    let found = fit(
+        &spindle,
+        &moved(&spindle, &motion),
+        &RegistrationSettings::default(),
+    );
+    assert!(found.ambiguous);
+    let lumpy = lump(1.0);
+    let noisy = cloud(&lumpy, 3000, 0.5, 5);
+    let found = register(
+        &RegistrationShape::mesh(&lumpy),
+        &RegistrationShape::cloud(&noisy),
+        &RegistrationSettings::default(),
+    )
+    .expect("sound shapes");
+    let precision = found.precision.expect("a whole shape shares enough");
+    let summed: f64 = precision.axes.iter().map(|a| a.deg * a.deg).sum();
+    assert!((summed.sqrt() - precision.rotation_deg).abs() < 1e-9);
+    assert!(precision.axes.windows(2).all(|w| w[0].deg >= w[1].deg));
+    // The body is longest along x, about which it is easiest to turn.
+    assert!(precision.axes[0].axis.x.abs() > 0.7, "{:?}", precision.axes);
 }
 
 /// Points of a plate 1 mm thick, hollow from above, with a hump that is a hollow from below and two that are not; those whose flat

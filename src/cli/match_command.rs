@@ -51,7 +51,7 @@ pub struct MatchOptions {
     #[arg(long, value_enum, default_value = "auto")]
     extent: ExtentOption,
 
-    /// Estimate one scale factor besides the motion.
+    /// Estimate one scale factor besides the motion; of cut shapes factors from 0.8 to 1.25 are looked for.
     #[arg(long)]
     scale: bool,
 }
@@ -144,7 +144,7 @@ pub fn run(args: &MatchArgs, common: &Common) -> Result<Verdict, Failure> {
 pub fn summary(done: &MatchRun) -> String {
     let r = &done.registration;
     let mut text = format!(
-        "{} on {}: rms {:.4} mm, 95 % below {:.4} mm, largest {:.4} mm, overlap {:.0} %{}{}\n",
+        "{} on {}: rms {:.4} mm, 95 % below {:.4} mm, largest {:.4} mm, overlap {:.0} %{}{}{}\n",
         done.source.name,
         done.target.name,
         r.rms,
@@ -153,6 +153,7 @@ pub fn summary(done: &MatchRun) -> String {
         100.0 * r.overlap,
         if r.mirrored { ", mirrored" } else { "" },
         if r.ambiguous { ", AMBIGUOUS" } else { "" },
+        if r.uncertain { ", UNCERTAIN" } else { "" },
     );
     text += "T_target_source:\n";
     for row in r.T_target_source.to_rows() {

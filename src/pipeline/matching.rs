@@ -112,6 +112,12 @@ pub fn match_shapes(
             .iter()
             .map(|reason| format!("the pose is ambiguous: {reason}")),
     );
+    warnings.extend(
+        registration
+            .uncertainty
+            .iter()
+            .map(|reason| format!("the pose is uncertain: {reason}")),
+    );
     Ok(MatchRun {
         target: target_side,
         source: source_side,

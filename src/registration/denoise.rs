@@ -37,6 +37,8 @@ const STEEP: f64 = 0.8;
 pub(crate) struct Denoised {
     pub(crate) points: Vec<DVec3>,
     pub(crate) normals: Vec<DVec3>,
+    /// Share of the noise's variance that is left in each place: large at the border, where the field leans on one side.
+    pub(crate) left: Vec<f64>,
     /// Standard deviation of the noise, in the unit of the points.
     pub(crate) noise: f64,
 }
@@ -79,6 +81,8 @@ struct Fit {
     normal: DVec3,
     /// Weighted rms of the heights over the field.
     residual: f64,
+    /// Share of the noise's variance that is left in the place.
+    left: f64,
 }
 
 /// Median spacing of a surface cloud: `sqrt(pi r^2 / m)` with `r` the distance of the `m`-th (13th) neighbour.
@@ -129,28 +133,32 @@ pub(crate) fn denoise(raw: &[DVec3], wanted: &[u32]) -> Denoised {
     let h = (2.0 * s).max((4.0 * noise).min(0.06));
     let cells = Cells::new(raw, 2.0 * h);
     let limit = 6.0 * noise + 0.01;
-    let moved: Vec<(DVec3, DVec3)> = wanted
+    let moved: Vec<(DVec3, (DVec3, f64))> = wanted
         .par_iter()
         .map(|&i| {
             let start = raw[i as usize];
             let mut place = start;
             let mut normal = DVec3::ZERO;
+            let mut left = 1.0;
             for _ in 0..2 {
                 if let Some(f) = fit(raw, &cells, &walls, place, h) {
                     normal = f.normal;
+                    left = f.left;
                     if f.place.distance(start) <= limit {
                         place = f.place;
                     }
                 }
             }
-            (place, normal)
+            (place, (normal, left))
         })
         .collect();
-    let (points, mut normals): (Vec<_>, Vec<_>) = moved.into_iter().unzip();
+    let (points, rest): (Vec<_>, Vec<_>) = moved.into_iter().unzip();
+    let (mut normals, left): (Vec<_>, Vec<_>) = rest.into_iter().unzip();
     orient(&points, &mut normals, spacing(&points));
     Denoised {
         normals: averaged(&points, &normals, h),
         points,
+        left,
         noise,
     }
 }
@@ -197,6 +205,7 @@ fn fit_to(raw: &[DVec3], near: &[(u32, f64)], x: DVec3, h: f64) -> Option<Fit> {
             place: x,
             normal: frame.z_axis,
             residual: 0.0,
+            left: 1.0,
         });
     }
     let local = |p: DVec3| frame.transpose() * (p - centre) / h;
@@ -213,7 +222,8 @@ fn fit_to(raw: &[DVec3], near: &[(u32, f64)], x: DVec3, h: f64) -> Option<Fit> {
         a[(k, k)] += if k < 3 { 1e-5 } else { 3e-3 };
     }
     a.fill_upper_triangle_with_lower_triangle();
-    let c = a.cholesky()?.solve(&b);
+    let system = a.cholesky()?;
+    let c = system.solve(&b);
     let field =
         |q: DVec3| c[0] + c[1] * q.x + c[2] * q.y + c[3] * q.x * q.x + c[4] * q.x * q.y + c[5] * q.y * q.y;
     let q = local(x);
@@ -222,18 +232,29 @@ fn fit_to(raw: &[DVec3], near: &[(u32, f64)], x: DVec3, h: f64) -> Option<Fit> {
         -(c[2] + c[4] * q.x + 2.0 * c[5] * q.y),
         1.0,
     );
-    let variance: f64 = near
-        .iter()
-        .map(|&(i, w)| {
-            let q = local(raw[i as usize]);
-            w * (q.z - field(q)).powi(2)
-        })
-        .sum::<f64>()
-        / total;
+    // The height at `x` is a weighted sum of all heights; its weights squared say how much of their noise it keeps.
+    let at = system.solve(&SVector::<f64, 6>::from([
+        1.0,
+        q.x,
+        q.y,
+        q.x * q.x,
+        q.x * q.y,
+        q.y * q.y,
+    ]));
+    let influence = |q: DVec3| {
+        at[0] + at[1] * q.x + at[2] * q.y + at[3] * q.x * q.x + at[4] * q.x * q.y + at[5] * q.y * q.y
+    };
+    let (mut variance, mut left) = (0.0, 0.0);
+    for &(i, w) in near {
+        let q = local(raw[i as usize]);
+        variance += w / total * (q.z - field(q)).powi(2);
+        left += (w / total * influence(q)).powi(2);
+    }
     Some(Fit {
         place: centre + frame * (DVec3::new(q.x, q.y, field(q)) * h),
         normal: (frame * slope).normalize(),
         residual: h * variance.sqrt(),
+        left: left.min(1.0),
     })
 }
 

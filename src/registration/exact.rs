@@ -14,11 +14,14 @@ pub(crate) struct Touch {
     pub(crate) normal: DVec3,
 }
 
-/// A surface that answers nearest-place queries. Its mirror image shares the index: queries are mirrored instead.
+/// A surface that answers nearest-place queries. Its mirror image and its copies of other sizes share the index: queries are mirrored
+/// and scaled instead.
 #[derive(Clone)]
 pub(crate) struct ExactSurface {
     kind: Arc<Kind>,
     mirrored: bool,
+    /// Size of this copy as a factor of the indexed surface.
+    size: f64,
 }
 
 enum Kind {
@@ -80,6 +83,7 @@ impl ExactSurface {
         Self {
             kind: Arc::new(kind),
             mirrored: false,
+            size: 1.0,
         }
     }
 
@@ -88,19 +92,34 @@ impl ExactSurface {
         Self {
             kind: Arc::clone(&self.kind),
             mirrored: !self.mirrored,
+            size: self.size,
+        }
+    }
+
+    /// The surface enlarged by `factor` about the origin.
+    pub(crate) fn resized(&self, factor: f64) -> Self {
+        Self {
+            kind: Arc::clone(&self.kind),
+            mirrored: self.mirrored,
+            size: self.size * factor,
         }
     }
 
     /// Nearest place to `q`.
     pub(crate) fn touch(&self, q: DVec3) -> Touch {
+        let inner = q / self.size;
         if self.mirrored {
-            let touch = self.kind.touch(flip(q));
+            let touch = self.kind.touch(flip(inner));
             return Touch {
-                place: flip(touch.place),
+                place: flip(touch.place) * self.size,
                 normal: flip(touch.normal),
             };
         }
-        self.kind.touch(q)
+        let touch = self.kind.touch(inner);
+        Touch {
+            place: touch.place * self.size,
+            normal: touch.normal,
+        }
     }
 }
 

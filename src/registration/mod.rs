@@ -15,7 +15,7 @@
 //! | `oriented`, `isolated`, `denoise`, `walls`, `cells`, `nearest_grid`, `exact` | a surface prepared for search |
 //! | `faces` | which hand and which face of a thin sheet may be outside |
 //! | `surface` | whole shapes |
-//! | `partial`, `pairs` | partial shapes |
+//! | `partial`, `pairs`, `sizes` | partial shapes, also of unknown size |
 //! | `score`, `refine`, `solve` | shared by both: free space, closest points, one linear step |
 //! | `significance` | whether one whole pose is better than another by more than the shapes differ |
 //! | `precision` | how precisely the pose is known |
@@ -43,6 +43,7 @@ mod score;
 mod settings;
 mod shape;
 mod significance;
+mod sizes;
 mod solve;
 mod surface;
 mod verdict;
@@ -51,7 +52,9 @@ mod walls;
 pub use denoise::{CleanCloud, clean_cloud};
 pub use difference::{Difference, SheetContext, SheetDifference, difference};
 pub use naming::{NamedPair, Naming, NamingSettings, name_shapes};
-pub use result::{Conditioning, Hypothesis, Method, Precision, Registration, SlidingDirection};
+pub use result::{
+    AxisPrecision, Conditioning, Hypothesis, Method, Precision, Registration, SlidingDirection,
+};
 pub use settings::{Extent, Mirror, RegistrationSettings};
 pub use shape::{RegistrationError, RegistrationShape, Surface};
 pub use verdict::register;

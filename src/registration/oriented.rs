@@ -34,6 +34,10 @@ pub(crate) struct View {
     /// Samples in random order: any prefix is a fair sample of the surface.
     pub(crate) points: Vec<DVec3>,
     pub(crate) normals: Vec<DVec3>,
+    /// Share of the noise's variance that is left in each sample.
+    pub(crate) left: Vec<f64>,
+    /// Median of those.
+    pub(crate) usual_left: f64,
     /// Samples at the border of what was seen.
     pub(crate) border: Vec<bool>,
     pub(crate) spacing: f64,
@@ -51,6 +55,8 @@ pub(crate) struct View {
     pub(crate) centre: DVec3,
     /// Handedness was changed.
     pub(crate) mirrored: bool,
+    /// Size of this copy as a factor of the shape's own.
+    pub(crate) size: f64,
 }
 
 /// Diagonal of the box along the principal axes, mm.
@@ -120,7 +126,10 @@ impl View {
         let step = mesh.points.len().div_ceil(MOST_VERTICES).max(1);
         let vertices = mesh.points.iter().copied().step_by(step).collect();
         let exact = ExactSurface::of_mesh(&mesh, face_normals);
-        Self::assemble(points, normals, border, spacing, exact, vertices, 0.0, centre)
+        let left = vec![1.0; points.len()];
+        Self::assemble(
+            points, normals, left, border, spacing, exact, vertices, 0.0, centre,
+        )
     }
 
     fn of_cloud(
@@ -132,27 +141,38 @@ impl View {
     ) -> Self {
         let order = shuffled(raw.len(), rng);
         let wanted = &order[..samples.min(raw.len())];
-        let (points, normals, noise) = match normals {
+        let (points, normals, left, noise) = match normals {
             Some(given) => {
                 let points = wanted.iter().map(|&i| raw[i as usize]).collect();
                 let normals = wanted.iter().map(|&i| given[i as usize].normalize()).collect();
-                (points, normals, 0.0)
+                (points, normals, vec![1.0; wanted.len()], 0.0)
             }
             None => {
                 let some: Vec<DVec3> = order.iter().take(MOST_RAW).map(|&i| raw[i as usize]).collect();
                 let wanted: Vec<u32> = (0..wanted.len() as u32).collect();
                 let clean = denoise::denoise(&some, &wanted);
-                (clean.points, clean.normals, clean.noise)
+                (clean.points, clean.normals, clean.left, clean.noise)
             }
         };
         let spacing = denoise::spacing(&points);
         let border = denoise::border(&points, &normals, spacing, 0.03);
-        Self::assemble(points, normals, border, spacing, None, Vec::new(), noise, centre)
+        Self::assemble(
+            points,
+            normals,
+            left,
+            border,
+            spacing,
+            None,
+            Vec::new(),
+            noise,
+            centre,
+        )
     }
 
     fn assemble(
         points: Vec<DVec3>,
         normals: Vec<DVec3>,
+        left: Vec<f64>,
         border: Vec<bool>,
         spacing: f64,
         exact: Option<ExactSurface>,
@@ -171,6 +191,8 @@ impl View {
             closed: (seen as f64) < 0.01 * points.len() as f64,
             points,
             normals,
+            usual_left: median(&left),
+            left,
             border,
             spacing,
             exact,
@@ -178,6 +200,7 @@ impl View {
             noise,
             centre,
             mirrored: false,
+            size: 1.0,
         }
     }
 
@@ -190,6 +213,7 @@ impl View {
         let mut image = Self::assemble(
             points,
             normals,
+            self.left.clone(),
             self.border.clone(),
             self.spacing,
             Some(self.exact.mirror_image()),
@@ -201,11 +225,31 @@ impl View {
         image
     }
 
+    /// The same surface enlarged by `factor` about its centroid.
+    pub(crate) fn resized(&self, factor: f64) -> Self {
+        let grown = |points: &[DVec3]| points.iter().map(|p| *p * factor).collect::<Vec<_>>();
+        let mut copy = Self::assemble(
+            grown(&self.points),
+            self.normals.clone(),
+            self.left.clone(),
+            self.border.clone(),
+            self.spacing * factor,
+            Some(self.exact.resized(factor)),
+            grown(&self.vertices),
+            self.noise * factor,
+            self.centre,
+        );
+        copy.mirrored = self.mirrored;
+        copy.size = self.size * factor;
+        copy
+    }
+
     /// The same surface with the other face outside.
     pub(crate) fn turned(&self) -> Self {
         let mut turned = Self::assemble(
             self.points.clone(),
             self.normals.iter().map(|n| -*n).collect(),
+            self.left.clone(),
             self.border.clone(),
             self.spacing,
             Some(self.exact.clone()),
@@ -226,6 +270,12 @@ impl View {
     pub(crate) fn area(&self) -> f64 {
         self.points.len() as f64 * self.spacing * self.spacing
     }
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut values = values.to_vec();
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// A random order of `0..n`.

@@ -17,7 +17,7 @@
 use super::oriented::View;
 use super::pairs::PairTable;
 use super::refine::{Level, refine};
-use super::score::{FINE, ScoreScale, both_ways, one_way};
+use super::score::{FINE, ScoreScale, both_ways, one_way, turn_of};
 use crate::geometry::Rigid;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -52,6 +52,9 @@ impl Budget {
     }
 }
 
+/// Farthest that a fit may go from the size it was started at (logarithm): two steps of [`super::sizes`].
+const FARTHEST_SIZE: f64 = 0.15;
+
 const COARSE: ScoreScale = ScoreScale {
     inlier: 0.04,
     free: 0.05,
@@ -81,7 +84,7 @@ pub(crate) fn partial(
     seed: u64,
 ) -> Vec<PartialFit> {
     let table = PairTable::new(source, target);
-    let first = round(source, target, &table, guesses, Budget::of(poses), seed);
+    let first = round(source, target, &table, guesses, Budget::of(poses), seed, false);
     let sure = first.first().is_some_and(|best| {
         best.score >= GOOD_SCORE && rival(&first).is_none_or(|r| r <= best.score - CLEAR_MARGIN)
     });
@@ -101,7 +104,20 @@ pub(crate) fn partial(
         &found,
         Budget::of(escalated),
         seed.wrapping_add(1),
+        false,
     )
+}
+
+/// One round of poses whose size is within a few percent of the source's; the last refinement finds it.
+pub(crate) fn one_size(
+    source: &View,
+    target: &View,
+    guesses: &[Rigid],
+    poses: usize,
+    seed: u64,
+) -> Vec<PartialFit> {
+    let table = PairTable::new(source, target);
+    round(source, target, &table, guesses, Budget::of(poses), seed, true)
 }
 
 /// Score of the best pose over 15 degrees from the first.
@@ -119,6 +135,7 @@ fn round(
     guesses: &[Rigid],
     budget: Budget,
     seed: u64,
+    scale: bool,
 ) -> Vec<PartialFit> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut poses = guesses.to_vec();
@@ -142,18 +159,19 @@ fn round(
         count: 200,
         exact: false,
         cosine: 0.6,
+        by_noise: false,
     };
     let fits = rescore(fits, |pose| {
         let pose = refine(source, target, pose, level, false);
         (pose, both_ways(source, target, &pose, 400, MIDDLE))
     });
     let fits = thin(fits, 6.0, 0.025, budget.finished);
-    let fits = rescore(fits, |pose| finish(source, target, pose));
+    let fits = rescore(fits, |pose| finish(source, target, pose, scale));
     thin(fits, 6.0, 0.025, budget.finished)
 }
 
-/// The last refinement of a partial pose and its score at the finest scale.
-pub(crate) fn finish(source: &View, target: &View, pose: Rigid) -> (Rigid, f64) {
+/// The last refinement of a partial pose, its size included when asked for, and its score at the finest scale.
+fn finish(source: &View, target: &View, pose: Rigid, scale: bool) -> (Rigid, f64) {
     let level = Level {
         iterations: 12,
         from: 0.04,
@@ -161,6 +179,7 @@ pub(crate) fn finish(source: &View, target: &View, pose: Rigid) -> (Rigid, f64) 
         count: 800,
         exact: false,
         cosine: 0.6,
+        by_noise: false,
     };
     let pose = refine(source, target, pose, level, false);
     let exact = Level {
@@ -170,9 +189,29 @@ pub(crate) fn finish(source: &View, target: &View, pose: Rigid) -> (Rigid, f64) 
         count: 800,
         exact: true,
         cosine: 0.6,
+        by_noise: false,
     };
     let pose = refine(source, target, pose, exact, false);
+    let pose = if scale {
+        let start = Level { from: 0.03, ..level };
+        let grown = refine(
+            source,
+            target,
+            refine(source, target, pose, start, true),
+            exact,
+            true,
+        );
+        if near_its_size(&grown) { grown } else { pose }
+    } else {
+        pose
+    };
     (pose, both_ways(source, target, &pose, usize::MAX, FINE))
+}
+
+/// Whether a fit has stayed near the size it was started at. A piece of a smooth surface hardly tells its size, and a fit that runs away
+/// has found none.
+pub(crate) fn near_its_size(pose: &Rigid) -> bool {
+    pose.linear.determinant().abs().cbrt().ln().abs() < FARTHEST_SIZE
 }
 
 fn rescore(fits: Vec<PartialFit>, better: impl Fn(Rigid) -> (Rigid, f64) + Sync) -> Vec<PartialFit> {
@@ -208,7 +247,7 @@ fn thin(fits: Vec<PartialFit>, degrees: f64, shift: f64, count: usize) -> Vec<Pa
             break;
         }
         let near = |k: &PartialFit| {
-            let (a, b) = (&k.pose.linear, &fit.pose.linear);
+            let (a, b) = (turn_of(&k.pose), turn_of(&fit.pose));
             let trace = a.x_axis.dot(b.x_axis) + a.y_axis.dot(b.y_axis) + a.z_axis.dot(b.z_axis);
             trace > least_trace && k.pose.translation.distance(fit.pose.translation) < shift
         };

@@ -5,10 +5,15 @@
 //! Tukey's biweight of its length; pairs over the tolerance, with normals over 53 degrees apart, or beside the other
 //! view's border are dropped (Chetverikov et al. 2002 trim by rank instead; a length is steadier when the overlap is unknown).
 //!
+//! The last steps weigh a pair by the inverse of the noise that de-noising has left in its two points ([`super::denoise`], the variance of
+//! a weighted least-squares value): at the border of what was seen and on thin data it is several times that of the middle. At
+//! 2 % noise and half overlap that brings the one talus that was 5.5 degrees off within 5.
+//!
 //! Two kinds of nearest point: the table of the view (coarse stages) or the kd-tree (the last steps). Cost: `O(points)` an
 //! iteration. Degenerate: no pair left returns the pose as it was.
 
 use super::oriented::View;
+use super::score::turn_of;
 use super::solve::{NormalEquations, cleaned};
 use crate::geometry::Rigid;
 use glam::DVec3;
@@ -26,8 +31,24 @@ pub(crate) struct Level {
     pub(crate) exact: bool,
     /// Least cosine between the normals of a pair.
     pub(crate) cosine: f64,
+    /// Pairs count by the inverse of the noise that de-noising has left in them.
+    pub(crate) by_noise: bool,
 }
 
+/// What an accepted pair says of a pose.
+pub(crate) struct PairRow {
+    pub(crate) place: DVec3,
+    pub(crate) direction: DVec3,
+    pub(crate) residual: f64,
+    /// Tukey's weight of the residual.
+    pub(crate) weight: f64,
+    /// What the pair counts for besides: the inverse of the variance of what noise is left in it, 1 for a median pair.
+    pub(crate) trust: f64,
+}
+
+/// Least noise that a pair is taken to have, in that of a median pair: a place fitted to many points is not known better than the
+/// field is right.
+const LEAST_LEFT: f64 = 0.5;
 /// Longest rotation of one iteration, rad.
 const LONGEST_TURN: f64 = 0.3;
 /// A partner at the border counts only when it is this close along the surface, in units.
@@ -67,6 +88,7 @@ pub(crate) fn resting_level(source: &View, target: &View) -> Level {
         count: 4000,
         exact: true,
         cosine: 0.6,
+        by_noise: true,
     }
 }
 
@@ -95,20 +117,13 @@ pub(crate) fn equations(
     tolerance: f64,
 ) -> NormalEquations {
     let mut rows = NormalEquations::new(DVec3::ZERO);
-    each_pair(
-        source,
-        target,
-        pose,
-        level,
-        tolerance,
-        |place, direction, residual, weight| {
-            rows.add(place, direction, residual, weight);
-        },
-    );
+    each_pair(source, target, pose, level, tolerance, |row| {
+        rows.add(row.place, row.direction, row.residual, row.weight * row.trust)
+    });
     rows
 }
 
-/// Calls `visit(place, direction, residual, weight)` for every accepted pair at a pose.
+/// Calls `visit` for every accepted pair at a pose.
 #[inline]
 pub(crate) fn each_pair(
     source: &View,
@@ -116,17 +131,24 @@ pub(crate) fn each_pair(
     pose: &Rigid,
     level: Level,
     tolerance: f64,
-    mut visit: impl FnMut(DVec3, DVec3, f64, f64),
+    mut visit: impl FnMut(PairRow),
 ) {
+    let trust = |i: usize, j: usize| {
+        if !level.by_noise {
+            return 1.0;
+        }
+        let usual = source.usual_left + target.usual_left;
+        usual / (source.left[i] + target.left[j]).max(LEAST_LEFT * usual)
+    };
     let back = pose.inverse();
-    let turn = pose.linear;
+    let turn = turn_of(pose);
     for i in 0..level.count.min(source.points.len()) {
         let q = pose.apply(source.points[i]);
         if let Some(j) = partner(target, q, level.exact) {
             let (n, m) = (turn * source.normals[i], target.normals[j]);
             let beside = target.border[j];
             if let Some(p) = accepted(q, target.points[j], n, m, m, beside, level, tolerance) {
-                visit(q, p.direction, p.residual, p.weight);
+                visit(p.row(q, trust(i, j)));
             }
         }
     }
@@ -136,7 +158,7 @@ pub(crate) fn each_pair(
             let q = pose.apply(source.points[i]);
             let (n, m) = (turn * source.normals[i], target.normals[j]);
             if let Some(p) = accepted(q, x, n, m, n, source.border[i], level, tolerance) {
-                visit(q, p.direction, p.residual, p.weight);
+                visit(p.row(q, trust(i, j)));
             }
         }
     }
@@ -147,6 +169,18 @@ struct Accepted {
     direction: DVec3,
     residual: f64,
     weight: f64,
+}
+
+impl Accepted {
+    fn row(self, place: DVec3, trust: f64) -> PairRow {
+        PairRow {
+            place,
+            direction: self.direction,
+            residual: self.residual,
+            weight: self.weight,
+            trust,
+        }
+    }
 }
 
 #[inline]

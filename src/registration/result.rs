@@ -55,12 +55,25 @@ pub struct Conditioning {
 
 /// How far the pose would scatter if the same surfaces were scanned again: standard errors from the scatter of the residuals from
 /// one patch of the surface to the next. It says nothing of other basins; the runners-up do.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Precision {
     /// Standard error of the rotation, degrees: root of the summed variances about three axes.
     pub rotation_deg: f64,
+    /// The three axes about which the rotation errs independently, the loosest first.
+    pub axes: Vec<AxisPrecision>,
     /// Standard error of the place of the middle of the shared surface, mm.
     pub translation_mm: f64,
+    /// Standard error of the factor of size, percent; none for a rigid motion.
+    pub scale_percent: Option<f64>,
+}
+
+/// How precisely the rotation about one axis is known.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AxisPrecision {
+    /// Unit vector in the target's frame.
+    pub axis: DVec3,
+    /// Standard error of the rotation about it, degrees.
+    pub deg: f64,
 }
 
 /// The pose of a source on a target.
@@ -83,6 +96,11 @@ pub struct Registration {
     pub ambiguous: bool,
     /// Plain reasons for `ambiguous`, empty when it is not.
     pub ambiguity: Vec<String>,
+    /// The pose is the right one of those that compete, as far as can be told, but known less precisely than
+    /// [`uncertain_deg`](super::RegistrationSettings::uncertain_deg).
+    pub uncertain: bool,
+    /// Plain reasons for `uncertain`, empty when it is not.
+    pub uncertainty: Vec<String>,
     /// Verified poses, the chosen one first; the runners-up are over 8 degrees apart from each other.
     pub hypotheses: Vec<Hypothesis>,
     /// Symmetric root mean square distance of the surfaces, mm; of the shared part for partial shapes.

@@ -11,7 +11,7 @@
 
 use super::oriented::View;
 use crate::geometry::Rigid;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// Tolerances of a score, in units.
 #[derive(Clone, Copy, Debug)]
@@ -34,7 +34,7 @@ const OPPOSITE: f64 = -0.3;
 /// Score of the first `count` points of `moving`, moved by `pose`, against `fixed`.
 pub(crate) fn one_way(moving: &View, count: usize, fixed: &View, pose: &Rigid, s: ScoreScale) -> f64 {
     let count = count.min(moving.points.len());
-    let turn = pose.linear;
+    let turn = turn_of(pose);
     let mut sum = 0.0;
     for i in 0..count {
         let q = pose.apply(moving.points[i]);
@@ -44,6 +44,12 @@ pub(crate) fn one_way(moving: &View, count: usize, fixed: &View, pose: &Rigid, s
         }
     }
     sum / count.max(1) as f64
+}
+
+/// The linear part of a pose without its size: what it does to normals.
+#[inline]
+pub(crate) fn turn_of(pose: &Rigid) -> DMat3 {
+    pose.linear * pose.linear.determinant().abs().cbrt().recip()
 }
 
 #[inline]
@@ -80,7 +86,9 @@ fn evidence(q: DVec3, normal: DVec3, fixed: &View, j: usize, s: ScoreScale) -> f
 pub(crate) fn both_ways(source: &View, target: &View, pose: &Rigid, count: usize, s: ScoreScale) -> f64 {
     let there = one_way(source, count, target, pose, s);
     let back = one_way(target, count, source, &pose.inverse(), s);
-    2.0 * (source.area() * there + target.area() * back) / (source.area() + target.area())
+    let growth = pose.linear.determinant().abs().cbrt();
+    let (moved, fixed) = (source.area() * growth * growth, target.area());
+    2.0 * (moved * there + fixed * back) / (moved + fixed)
 }
 
 /// The scale at which final poses are compared.

@@ -37,7 +37,7 @@ pub struct RegistrationSettings {
     pub mirror: Mirror,
     /// Whole shapes, partial ones, or find out.
     pub extent: Extent,
-    /// Estimate a similarity (one scale factor) instead of a rigid motion. Whole shapes only.
+    /// Estimate a similarity (one scale factor) instead of a rigid motion. Of cut shapes factors from 0.8 to 1.25 are looked for.
     pub scale: bool,
     /// Points a surface is represented by while searching. 4 000 reach the accuracy measured on bones of any density.
     pub samples: usize,
@@ -57,6 +57,11 @@ pub struct RegistrationSettings {
     /// ... and is, unless its lead over that pose is there over most of the surface: this many standard errors of the lead
     /// from patch to patch. 2: one chance in 40.
     pub rival_lead: f64,
+    /// A pose is uncertain when its rotation is known to this many degrees only in less than 95 of 100 cases: it can slide or spin
+    /// by that much. 5: what is called a right pose.
+    pub uncertain_deg: f64,
+    /// ... or when that of its size does, percent.
+    pub uncertain_scale_percent: f64,
     /// Poses kept in [`Registration::hypotheses`](super::Registration::hypotheses).
     pub hypotheses: usize,
     /// A direction slides when its stiffness is below this share of the stiffest one.
@@ -78,6 +83,8 @@ impl Default for RegistrationSettings {
             rival_margin: 0.15,
             rival_residual: 1.3,
             rival_lead: 2.0,
+            uncertain_deg: 5.0,
+            uncertain_scale_percent: 10.0,
             hypotheses: 6,
             sliding_share: 0.002,
             seed: 0,
@@ -142,6 +149,18 @@ impl RegistrationSettings {
             self.rival_lead,
             self.rival_lead >= 0.0,
             "at least 0",
+        )?;
+        check(
+            "uncertain_deg",
+            self.uncertain_deg,
+            self.uncertain_deg > 0.0,
+            "over 0",
+        )?;
+        check(
+            "uncertain_scale_percent",
+            self.uncertain_scale_percent,
+            self.uncertain_scale_percent > 0.0,
+            "over 0",
         )?;
         check(
             "sliding_share",

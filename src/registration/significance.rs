@@ -24,9 +24,15 @@ const PATCHES: usize = 32;
 /// Samples of each surface.
 const SAMPLES: usize = 2000;
 
-/// By how many standard errors `best` fits better than `rival`; both take `source` to `target`.
-pub(crate) fn lead(source: &View, target: &View, best: &Rigid, rival: &Rigid) -> f64 {
-    let [ours, theirs] = [best, rival].map(|pose| Distances::new(source, target, pose, SAMPLES));
+/// By how many standard errors `best` fits better than `rival`; both take `source` to `target`. Distances over `clip` count as that.
+pub(crate) fn lead(source: &View, target: &View, best: &Rigid, rival: &Rigid, clip: f64) -> f64 {
+    let [ours, theirs] = [best, rival].map(|pose| {
+        let mut d = Distances::new(source, target, pose, SAMPLES);
+        for d in d.there.iter_mut().chain(&mut d.back) {
+            *d = d.min(clip);
+        }
+        d
+    });
     let mut gains = patch_gains(&source.points, &ours.there, &theirs.there);
     gains.extend(patch_gains(&target.points, &ours.back, &theirs.back));
     let n = gains.len() as f64;

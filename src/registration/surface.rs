@@ -9,8 +9,10 @@
 //! 4. The exact finish: nearest places on the surfaces themselves, untruncated, until the step vanishes. Untruncated, because two
 //!    persons' bones that differ in size fit best as wholes: a narrow tolerance locks on to one matching patch. A few hundred
 //!    samples tell basins and handedness apart ([`survey`]); only the winner is worth the whole surface ([`finish`]).
-//! 5. When most of the surface agrees closely once the rest is down-weighted (the median distance falls to less than half), the
-//!    robust fit wins: a fragment, a tumour or a lesion must not drag the healthy surface along.
+//! 5. From every surveyed pose, a fit that gives up on what does not agree (Geman and McClure's weights, their width following the
+//!    distance below which a quarter of the surface lies; Black and Rangarajan 1996). When that quarter comes to lie within 0.3 % of
+//!    the diagonal and at less than half its distance, that fit wins: a fragment, a tumour or a lesion must not drag the unchanged surface along, and the
+//!    question is what grew on it.
 //! 6. Raw clouds that differ by no more than their noise end with the narrow, symmetric point-to-plane fit of partial shapes.
 //!
 //! The symmetric distance decides. Papers: Besl and McKay 1992, Chen and Medioni 1992; Pottmann et al. 2006 for why the normal
@@ -34,6 +36,21 @@ const NEAR_SAMPLES: usize = 600;
 const FINISH_SAMPLES: usize = 4000;
 /// A fit rests when its step is below this share of the spacing; `converged` asks for 0.001.
 const AT_REST: f64 = 3e-4;
+/// Share of the surface that must be unchanged for a fit to it alone to win. A swelling as wide as 0.15 diagonals at one end leaves a quarter
+/// of a bone in place; with 0.4 two of sixteen such bones end upside down, with 0.25 none.
+const UNCHANGED: f64 = 0.25;
+/// Width of the robust weights, in distances below which [`UNCHANGED`] of the samples lie; for Gaussian distances that is one standard
+/// deviation.
+const ROBUST_WIDTH: f64 = 3.0;
+/// Largest distance of the part that agrees, in units, when noise is less than twice that: it is the same surface in both. Two persons' bones
+/// have a quarter of the surface somewhere that is a fifth as far apart as the rest, but not this close: with no such limit four of
+/// seven pairs of one wrist's bones and another's are laid on a likeness, two of them the wrong way round.
+const SAME_SURFACE: f64 = 0.003;
+/// The part that agrees must lie this much closer than in the fit to all for its own fit to win, and this much for there to be no doubt.
+const AGREES_BETTER: f64 = 0.5;
+const AGREES_CLEARLY: f64 = 0.2;
+/// Most iterations of a robust fit from each surveyed pose, and of the chosen one on all samples.
+const ROBUST_ITERATIONS: usize = 40;
 /// Most iterations of the exact finish.
 const FINISH_ITERATIONS: usize = 60;
 
@@ -43,6 +60,12 @@ pub(crate) struct WholeFit {
     pub(crate) pose: Rigid,
     /// Symmetric root mean square distance.
     pub(crate) rms: f64,
+    /// What ranks it: the same, or for a fit to the part that agrees the distance within which that part lies.
+    pub(crate) residual: f64,
+    /// A fit to the part that agrees.
+    pub(crate) robust: bool,
+    /// Where the other kind of fit (to all, or to the part that agrees) ends, when the shapes themselves do not decide between the two.
+    pub(crate) other_kind: Option<Rigid>,
     /// The last step was below 0.1 % of the spacing.
     pub(crate) converged: bool,
 }
@@ -117,6 +140,7 @@ pub(crate) fn survey(
         count: 150,
         exact: false,
         cosine: 0.0,
+        by_noise: false,
     };
     let poses = search(source, target, poses, rough, 8, scale);
     let fine = Level {
@@ -126,6 +150,7 @@ pub(crate) fn survey(
         count: 500,
         exact: false,
         cosine: 0.3,
+        by_noise: false,
     };
     let poses = search(source, target, poses, fine, keep.max(2), scale);
     let mut fits: Vec<WholeFit> = poses
@@ -149,20 +174,27 @@ pub(crate) fn finish(source: &View, target: &View, fits: &mut Vec<WholeFit>, sca
     if let Some(rival) = fits.get_mut(1) {
         *rival = near(rival);
         rival.rms = Distances::new(source, target, &rival.pose, FINISH_SAMPLES).rms();
+        rival.residual = rival.rms;
         if rival.rms < best_rms {
             *rival = finished(rival.clone());
         }
     }
     rank(fits);
+    if let Some(robust) = robust_fits(source, target, fits, scale) {
+        *fits = robust;
+        return;
+    }
     let Some(best) = fits.first_mut() else {
         return;
     };
-    if let Some(robust) = robust_finish(source, target, best.pose, scale) {
-        *best = robust;
-    }
     if let Some(close) = close_finish(source, target, best, scale) {
         *best = close;
     }
+}
+
+/// Beyond this a distance under a fit to the part that agrees says only that the place differs.
+pub(crate) fn differs_beyond(residual: f64) -> f64 {
+    ROBUST_WIDTH * residual
 }
 
 /// Whether whole shapes of this residual end with the narrow fit.
@@ -179,7 +211,14 @@ fn close_finish(source: &View, target: &View, fit: &WholeFit, scale: bool) -> Op
     }
     let (pose, converged) = rest(source, target, fit.pose, scale);
     let rms = Distances::new(source, target, &pose, FINISH_SAMPLES).rms();
-    Some(WholeFit { pose, rms, converged })
+    Some(WholeFit {
+        pose,
+        rms,
+        residual: rms,
+        robust: false,
+        other_kind: None,
+        converged,
+    })
 }
 
 /// A pose with the source brought to the target's size about its own centroid; whole shapes have comparable radii of gyration.
@@ -204,9 +243,13 @@ fn search(
         .into_par_iter()
         .map(|pose| {
             let pose = refine(source, target, pose, level, scale);
+            let rms = table_rms(source, target, &pose, 300);
             WholeFit {
                 pose,
-                rms: table_rms(source, target, &pose, 300),
+                rms,
+                residual: rms,
+                robust: false,
+                other_kind: None,
                 converged: false,
             }
         })
@@ -218,7 +261,7 @@ fn search(
 
 /// Sorts by residual (stable, so equal poses keep the order of their guesses) and drops poses near a better one.
 fn rank(fits: &mut Vec<WholeFit>) {
-    fits.sort_by(|a, b| a.rms.total_cmp(&b.rms));
+    fits.sort_by(|a, b| a.residual.total_cmp(&b.residual));
     let mut kept: Vec<WholeFit> = Vec::with_capacity(fits.len());
     for fit in fits.drain(..) {
         if kept
@@ -266,6 +309,9 @@ fn settle(
     let mut best = WholeFit {
         pose,
         rms: f64::INFINITY,
+        residual: f64::INFINITY,
+        robust: false,
+        other_kind: None,
         converged: false,
     };
     let mut worse = 0;
@@ -273,6 +319,7 @@ fn settle(
         let ExactRows { rows, rms, .. } = exact_rows(source, target, &pose, samples, None);
         if rms < best.rms {
             best.rms = rms;
+            best.residual = rms;
             best.pose = pose;
             worse = 0;
         } else {
@@ -300,7 +347,8 @@ fn settle(
 struct ExactRows {
     rows: NormalEquations,
     rms: f64,
-    median: f64,
+    /// Distance below which [`UNCHANGED`] of the samples lie.
+    close: f64,
 }
 
 /// Rows of exact nearest places in both directions, untruncated, or weighted by Geman and McClure's function of a width.
@@ -359,42 +407,70 @@ fn exact_rows(source: &View, target: &View, pose: &Rigid, samples: usize, width:
         }
     }
     let mut all: Vec<f64> = there.iter().chain(&back).map(|r| r.offset.length()).collect();
-    let middle = all.len() / 2;
-    let median = *all.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let last = (all.len() as f64 * UNCHANGED) as usize;
+    let close = *all.select_nth_unstable_by(last, f64::total_cmp).1;
     ExactRows {
         rows,
         rms: square.sqrt(),
-        median,
+        close,
     }
 }
 
-/// The fit that down-weights what does not agree; `None` when the plain fit agrees about as well.
-fn robust_finish(source: &View, target: &View, start: Rigid, scale: bool) -> Option<WholeFit> {
-    let plain = Distances::new(source, target, &start, FINISH_SAMPLES);
-    let median = plain.quantile(0.5);
-    // Only a heavy tail asks for it; in a plain Gaussian the 98th percentile of |x| is 3.4 medians.
-    if median <= 1e-9 || plain.quantile(0.98) < 4.0 * median {
+/// Fits to the part that agrees, best first; `None` when the plain fit of all agrees about as well. The best of `fits` is told where its
+/// own robust fit ends.
+fn robust_fits(source: &View, target: &View, fits: &mut [WholeFit], scale: bool) -> Option<Vec<WholeFit>> {
+    let plain_pose = fits.first()?.pose;
+    let plain = Distances::new(source, target, &plain_pose, NEAR_SAMPLES).quantile(UNCHANGED);
+    // Shapes that agree to within their sampling or their noise have no part that agrees better.
+    let noise = source.noise.max(target.noise);
+    let indistinct = (0.02 * source.spacing.min(target.spacing)).max(0.5 * noise);
+    if plain <= indistinct {
         return None;
     }
+    let all: Vec<Option<WholeFit>> = fits
+        .par_iter()
+        .map(|fit| robust_fit(source, target, fit.pose, NEAR_SAMPLES, scale))
+        .collect();
+    fits[0].other_kind = all[0].as_ref().map(|fit| fit.pose);
+    let mut found: Vec<WholeFit> = all.into_iter().flatten().collect();
+    rank(&mut found);
+    let same = SAME_SURFACE.max(0.5 * noise);
+    found.retain(|fit| fit.residual < same.min(AGREES_BETTER * plain));
+    let first = found.first_mut()?;
+    if let Some(better) = robust_fit(source, target, first.pose, FINISH_SAMPLES, scale) {
+        *first = better;
+    }
+    if first.residual > AGREES_CLEARLY * plain {
+        first.other_kind = Some(plain_pose);
+    }
+    Some(found)
+}
+
+/// The fit from a pose that down-weights what does not agree.
+fn robust_fit(source: &View, target: &View, start: Rigid, samples: usize, scale: bool) -> Option<WholeFit> {
+    let close = |pose: &Rigid| Distances::new(source, target, pose, samples).quantile(UNCHANGED);
     let mut pose = start;
-    let mut width = 3.0 * median;
+    let mut width = ROBUST_WIDTH * close(&pose);
     let mut converged = false;
-    for _ in 0..40 {
-        let found = exact_rows(source, target, &pose, FINISH_SAMPLES, Some(width));
+    for _ in 0..ROBUST_ITERATIONS {
+        let found = exact_rows(source, target, &pose, samples, Some(width));
         let step = found.rows.solve(scale, 0.0, 0.2)?;
         pose = cleaned(step.motion.after(&pose), scale);
-        // Three medians are two standard deviations; never wider than before, so that the fit settles.
-        width = width.min(3.0 * found.median).max(1e-6);
+        // Never wider than before, so that the fit settles.
+        width = width.min(ROBUST_WIDTH * found.close).max(1e-6);
         converged = step.size < 1e-3 * source.spacing;
-        let resting = median > 0.02 * source.spacing && step.size < AT_REST * source.spacing;
+        let resting = found.close > 0.02 * source.spacing && step.size < AT_REST * source.spacing;
         if resting || step.size < 1e-10 {
             break;
         }
     }
-    let robust = Distances::new(source, target, &pose, FINISH_SAMPLES);
-    (robust.quantile(0.5) < 0.5 * median).then(|| WholeFit {
+    let distances = Distances::new(source, target, &pose, samples);
+    Some(WholeFit {
         pose,
-        rms: robust.rms(),
+        rms: distances.rms(),
+        residual: distances.quantile(UNCHANGED),
+        robust: true,
+        other_kind: None,
         converged,
     })
 }

@@ -11,14 +11,15 @@
 use super::faces::{ViewPair, pairs};
 use super::isolated::without_isolated;
 use super::oriented::{self, View};
-use super::partial::{self, CLEAR_MARGIN, GOOD_SCORE, RIVAL_DEG};
+use super::partial::{self, CLEAR_MARGIN, GOOD_SCORE, PartialFit, RIVAL_DEG};
 use super::precision::standard_errors;
 use super::refine::{Level, equations, rest, resting_level};
-use super::result::{Conditioning, Hypothesis, Method, Precision, Registration};
+use super::result::{AxisPrecision, Conditioning, Hypothesis, Method, Precision, Registration};
 use super::score::{FINE, both_ways};
 use super::settings::{Extent, RegistrationSettings};
 use super::shape::{RegistrationError, RegistrationShape, Surface};
 use super::significance::lead;
+use super::sizes;
 use super::surface::{self, Distances, WholeFit};
 use crate::geometry::Rigid;
 use crate::matching::{MatchingSettings, pose_hypotheses};
@@ -48,6 +49,14 @@ const INDISTINCT: f64 = 2e-4;
 /// A partial pose replaces a whole one when its free-space score is this much higher.
 const PARTIAL_MARGIN: f64 = 0.1;
 
+/// Standard errors in half a 95 % interval of one number.
+const NINETY_FIVE: f64 = 2.0;
+
+/// Scores nearer than this are equal where the whole pose is one that the partial search could have found.
+const SAME_SCORE: f64 = 0.05;
+/// Noise above this, in units, may hide the rim of a cut.
+const HIDES_RIM: f64 = 0.005;
+
 /// A pose in view coordinates.
 #[derive(Clone, Debug)]
 struct Candidate {
@@ -58,6 +67,12 @@ struct Candidate {
     method: Method,
     /// Symmetric distance (units) for whole poses, score for partial ones.
     rms: f64,
+    /// What ranks whole poses, see [`WholeFit::residual`].
+    residual: f64,
+    /// A whole pose fitted to the part that agrees.
+    robust: bool,
+    /// See [`WholeFit::other_kind`].
+    other_kind: Option<Rigid>,
     score: f64,
     converged: bool,
 }
@@ -111,9 +126,9 @@ pub fn register(
         .par_iter()
         .map(|pair| scaffold_guesses(target, source, pair, unit, settings))
         .collect();
-    let search = Search {
-        pairs: &pairs,
-        guesses: &guesses,
+    let mut search = Search {
+        pairs,
+        guesses,
         settings,
     };
     let (candidates, doubt) = search.run();
@@ -174,6 +189,29 @@ fn scaffold_guesses(
         .collect()
 }
 
+/// The angle that the rotation's error stays below in 95 of 100 cases, degrees. The squared angle is a sum of independent squares about the
+/// three axes, which is taken for a multiple of a chi-square variable with the same mean and variance (Satterthwaite 1946).
+fn reach_deg(p: &Precision) -> f64 {
+    let (sum, squares) = p.axes.iter().fold((0.0, 0.0), |(sum, squares), a| {
+        let variance = a.deg * a.deg;
+        (sum + variance, squares + variance * variance)
+    });
+    if squares == 0.0 {
+        return 0.0;
+    }
+    let freedom: f64 = (sum * sum / squares).clamp(1.0, 3.0);
+    // 95 % points of chi-square over its freedom for 1, 2 and 3 degrees of freedom.
+    let quantiles = [3.841, 2.996, 2.605];
+    let k = ((freedom - 1.0) as usize).min(1);
+    let share = freedom - 1.0 - k as f64;
+    (sum * (quantiles[k] + (quantiles[k + 1] - quantiles[k]) * share)).sqrt()
+}
+
+/// Factor of size of a pose.
+fn scale_of(pose: &Rigid) -> f64 {
+    pose.linear.determinant().abs().cbrt()
+}
+
 /// What a mirrored view does to the source's coordinates about its centre.
 fn mirror_of(mirrored: bool) -> DMat3 {
     DMat3::from_diagonal(if mirrored {
@@ -184,9 +222,9 @@ fn mirror_of(mirrored: bool) -> DMat3 {
 }
 
 struct Search<'a> {
-    pairs: &'a [ViewPair],
+    pairs: Vec<ViewPair>,
     /// First guesses from the scaffolds, in view coordinates, one list a pair.
-    guesses: &'a [Vec<Rigid>],
+    guesses: Vec<Vec<Rigid>>,
     settings: &'a RegistrationSettings,
 }
 
@@ -204,7 +242,7 @@ impl Search<'_> {
     }
 
     /// All verified poses, the chosen one first, and a doubt that only the other search can raise.
-    fn run(&self) -> (Vec<Candidate>, Option<String>) {
+    fn run(&mut self) -> (Vec<Candidate>, Option<String>) {
         let whole = match self.settings.extent {
             Extent::Partial => Vec::new(),
             _ => self.whole(),
@@ -212,9 +250,13 @@ impl Search<'_> {
         if self.settings.extent == Extent::Whole || whole.first().is_some_and(|w| self.believed(w)) {
             return (whole, None);
         }
-        let partial = self.partial();
+        let partial = if self.settings.scale {
+            self.partial_of_any_size()
+        } else {
+            self.partial()
+        };
         match (whole.first(), partial.first()) {
-            (Some(w), Some(p)) if p.score > w.score + PARTIAL_MARGIN => {
+            (Some(w), Some(p)) if self.prefers_part(w, p) => {
                 let doubt = self.doubt_of_part(w, p);
                 (partial, doubt)
             }
@@ -223,10 +265,30 @@ impl Search<'_> {
         }
     }
 
+    /// Whether the best partial pose `p` replaces the best whole one `w`. A whole fit to the part that agrees is one of the poses that
+    /// the partial search ranks better, by free space, when parts are gone; and the better answer when they have changed.
+    fn prefers_part(&self, w: &Candidate, p: &Candidate) -> bool {
+        if !w.robust {
+            return p.score > w.score + PARTIAL_MARGIN;
+        }
+        if self.may_be_cut(w) {
+            return p.score > w.score - SAME_SCORE;
+        }
+        p.score > GOOD_SCORE && p.score > w.score + PARTIAL_MARGIN
+    }
+
+    /// A rim is seen, or noise may hide one and one surface has a part that the other lacks.
+    fn may_be_cut(&self, w: &Candidate) -> bool {
+        let (source, target) = self.views(w);
+        let hidden = source.noise.max(target.noise) > HIDES_RIM && !self.nothing_missing(w);
+        hidden || self.cut(w)
+    }
+
     fn believed(&self, fit: &Candidate) -> bool {
         let (source, target) = self.views(fit);
         let closed = source.closed && target.closed;
-        fit.score > SURELY_WHOLE || (closed && fit.rms < ONE_KIND)
+        // A large part agrees closely, and the rest is there: it has changed.
+        fit.score > SURELY_WHOLE || (closed && (fit.rms < ONE_KIND || fit.robust))
     }
 
     /// What speaks against a partial pose `p` of shapes that show no cut, `w` being the best pose of them as wholes.
@@ -271,7 +333,7 @@ impl Search<'_> {
         let mut surveys: Vec<Vec<WholeFit>> = self
             .pairs
             .iter()
-            .zip(self.guesses)
+            .zip(&self.guesses)
             .map(|(pair, guesses)| surface::survey(&pair.source, &pair.target, guesses, scale, 4))
             .collect();
         let least = |fits: &[WholeFit]| fits.first().map_or(f64::INFINITY, |f| f.rms);
@@ -293,15 +355,18 @@ impl Search<'_> {
                 mirrored: source.mirrored,
                 method: Method::Whole,
                 rms: fit.rms,
+                residual: fit.residual,
+                robust: fit.robust,
+                other_kind: fit.other_kind,
                 converged: fit.converged,
             }));
         }
         let both_hands = self.both_hands();
         let cost = |c: &Candidate| {
             if c.mirrored && both_hands {
-                c.rms / MIRROR_SHARE
+                c.residual / MIRROR_SHARE
             } else {
-                c.rms
+                c.residual
             }
         };
         out.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
@@ -325,19 +390,108 @@ impl Search<'_> {
     fn partial(&self) -> Vec<Candidate> {
         let s = self.settings;
         let mut out: Vec<Candidate> = Vec::new();
-        for (index, (pair, guesses)) in self.pairs.iter().zip(self.guesses).enumerate() {
+        for (index, (pair, guesses)) in self.pairs.iter().zip(&self.guesses).enumerate() {
             let (source, target) = (&pair.source, &pair.target);
             let fits = partial::partial(source, target, guesses, s.poses, s.escalated_poses, s.seed);
-            out.extend(fits.into_iter().map(|fit| Candidate {
-                pose: fit.pose,
-                pair: index,
-                mirrored: source.mirrored,
-                method: Method::Partial,
-                rms: 0.0,
-                score: fit.score,
-                converged: true,
-            }));
+            out.extend(fits.into_iter().map(|fit| self.partial_candidate(fit, index)));
         }
+        self.best_partial(out)
+    }
+
+    fn partial_candidate(&self, fit: PartialFit, pair: usize) -> Candidate {
+        Candidate {
+            pose: fit.pose,
+            pair,
+            mirrored: self.pairs[pair].source.mirrored,
+            method: Method::Partial,
+            rms: 0.0,
+            residual: 0.0,
+            robust: false,
+            other_kind: None,
+            score: fit.score,
+            converged: true,
+        }
+    }
+
+    /// The partial search with the source at every size of a grid; a second round for the most promising sizes.
+    fn partial_of_any_size(&mut self) -> Vec<Candidate> {
+        let s = self.settings;
+        let others = sizes::at_other_sizes(&self.pairs);
+        let each = others.len() / self.pairs.len().max(1);
+        let guesses: Vec<Vec<Rigid>> = (0..others.len())
+            .map(|k| self.guesses[k / each].clone())
+            .collect();
+        self.pairs.extend(others);
+        self.guesses.extend(guesses);
+        let round = |index: usize, guesses: &[Rigid], poses, seed| -> Vec<Candidate> {
+            let pair = &self.pairs[index];
+            let fits = partial::one_size(&pair.source, &pair.target, guesses, poses, seed);
+            let fits = fits.into_iter().map(|fit| {
+                let mut c = self.partial_candidate(fit, index);
+                c.score *= self.per_smaller_area(&c);
+                c
+            });
+            fits.collect()
+        };
+        let first = ((s.poses as f64 * sizes::FIRST_SHARE) as usize).max(1);
+        let mut found: Vec<Vec<Candidate>> = (0..self.pairs.len())
+            .map(|k| round(k, &self.guesses[k], first, s.seed))
+            .collect();
+        let sure = |found: &[Vec<Candidate>]| {
+            let mut all: Vec<&Candidate> = found.iter().flatten().collect();
+            all.sort_by(|a, b| b.score.total_cmp(&a.score));
+            let Some(best) = all.first() else { return true };
+            let unit = self.per_smaller_area(best);
+            let far = |c: &&&Candidate| c.pose.rotation_angle_deg(&best.pose) > RIVAL_DEG;
+            let rival = all.iter().find(far).map_or(f64::NEG_INFINITY, |c| c.score);
+            best.score >= GOOD_SCORE * unit && rival <= best.score - CLEAR_MARGIN * unit
+        };
+        if s.escalated_poses > s.poses && !sure(&found) {
+            let best_of = |c: &[Candidate]| c.iter().map(|c| c.score).fold(f64::NEG_INFINITY, f64::max);
+            let mut order: Vec<usize> = (0..found.len()).collect();
+            order.sort_by(|&a, &b| best_of(&found[b]).total_cmp(&best_of(&found[a])));
+            for &k in order.iter().take(sizes::SECOND_ROUNDS) {
+                let mut guesses = self.guesses[k].clone();
+                guesses.extend(found[k].iter().map(|c| c.pose));
+                found[k] = round(k, &guesses, s.escalated_poses, s.seed.wrapping_add(1));
+            }
+        }
+        let mut all: Vec<Candidate> = found.into_iter().flatten().collect();
+        all.sort_by(|a, b| b.score.total_cmp(&a.score));
+        // One pose was found from several sizes: the best of them stands for it.
+        let mut kept: Vec<Candidate> = Vec::new();
+        for c in all {
+            if !kept.iter().any(|k| self.same_similarity(k, &c)) {
+                kept.push(c);
+            }
+        }
+        // Back to the score that is reported, in the areas of the best.
+        if let Some(unit) = kept.first().map(|best| self.per_smaller_area(best)) {
+            kept.iter_mut().for_each(|c| c.score /= unit);
+        }
+        self.best_partial(kept)
+    }
+
+    /// See [`sizes::per_smaller_area`].
+    fn per_smaller_area(&self, c: &Candidate) -> f64 {
+        let (source, target) = self.views(c);
+        sizes::per_smaller_area(source, target, scale_of(&c.pose))
+    }
+
+    fn same_similarity(&self, a: &Candidate, b: &Candidate) -> bool {
+        a.mirrored == b.mirrored
+            && (self.size(a) / self.size(b)).ln().abs() < sizes::SAME_SIZE
+            && a.pose.rotation_angle_deg(&b.pose) < sizes::SAME_TURN_DEG
+    }
+
+    /// Factor of the source's size in a candidate.
+    fn size(&self, c: &Candidate) -> f64 {
+        self.views(c).0.size * scale_of(&c.pose)
+    }
+
+    /// The best of all partial poses, measured and at rest.
+    fn best_partial(&self, mut out: Vec<Candidate>) -> Vec<Candidate> {
+        let s = self.settings;
         let both_hands = self.both_hands();
         let gain = |c: &Candidate| {
             if c.mirrored && both_hands {
@@ -353,7 +507,11 @@ impl Search<'_> {
         }
         if let Some(best) = out.first_mut() {
             let (source, target) = self.views(best);
-            (best.pose, best.converged) = rest(source, target, best.pose, false);
+            let (pose, converged) = rest(source, target, best.pose, s.scale);
+            best.converged = converged;
+            if !s.scale || partial::near_its_size(&pose) {
+                best.pose = pose;
+            }
         }
         out
     }
@@ -366,7 +524,9 @@ impl Search<'_> {
         };
         let (source, target) = self.views(&best);
         let fit = self.measure(&best);
+        let precision = self.precision(&best, unit);
         let ambiguity = self.ambiguity(&candidates);
+        let uncertainty = self.uncertainty(&best, precision.as_ref());
         let hypotheses = candidates
             .iter()
             .take(self.settings.hypotheses)
@@ -385,6 +545,8 @@ impl Search<'_> {
             mirrored: best.mirrored,
             ambiguous: !ambiguity.is_empty(),
             ambiguity,
+            uncertain: !uncertainty.is_empty(),
+            uncertainty,
             hypotheses,
             rms: fit.rms * unit,
             p95: fit.p95 * unit,
@@ -394,8 +556,8 @@ impl Search<'_> {
             score: best.score,
             method: best.method,
             conditioning: self.conditioning(&best),
-            precision: self.precision(&best, unit),
-            noise_source: source.noise * unit,
+            precision,
+            noise_source: source.noise * unit / source.size,
             noise_target: target.noise * unit,
         }
     }
@@ -408,6 +570,9 @@ impl Search<'_> {
             mirrored: self.pairs[0].source.mirrored,
             method: Method::Partial,
             rms: 0.0,
+            residual: 0.0,
+            robust: false,
+            other_kind: None,
             score: 0.0,
             converged: false,
         };
@@ -428,29 +593,38 @@ impl Search<'_> {
             .skip(1)
             .find(|c| c.mirrored == best.mirrored && c.pose.rotation_angle_deg(&best.pose) > RIVAL_DEG);
         let other_hand = candidates.iter().find(|c| c.mirrored != best.mirrored);
+        let other_size = candidates.iter().skip(1).find(|c| {
+            c.mirrored == best.mirrored && (self.size(c) / self.size(best)).ln().abs() > sizes::OTHER_SIZE
+        });
         match best.method {
             Method::Whole => {
-                if let Some(r) = rival.filter(|r| r.rms < s.rival_residual * best.rms.max(INDISTINCT)) {
+                if let Some(r) =
+                    rival.filter(|r| r.residual < s.rival_residual * best.residual.max(INDISTINCT))
+                {
                     let angle = r.pose.rotation_angle_deg(&best.pose);
-                    let ratio = r.rms / best.rms.max(INDISTINCT);
+                    let ratio = r.residual / best.residual.max(INDISTINCT);
                     let (source, target) = self.views(best);
-                    let lead = lead(source, target, &best.pose, &r.pose);
+                    let clip = if best.robust {
+                        surface::differs_beyond(best.residual)
+                    } else {
+                        f64::INFINITY
+                    };
+                    let lead = lead(source, target, &best.pose, &r.pose, clip);
                     // Where a part is missing, distances say less than what lies in free space does.
                     let open = !(source.closed && target.closed);
                     let by_free_space = open && best.score > r.score + CLEAR_MARGIN;
-                    if (lead < s.rival_lead && !by_free_space) || r.rms < s.rival_residual * INDISTINCT {
+                    if (lead < s.rival_lead && !by_free_space) || r.residual < s.rival_residual * INDISTINCT {
                         reasons.push(format!(
                             "a pose {angle:.0} degrees away has only {ratio:.2} times the residual, a lead of {lead:.1} standard \
                              errors over the surface"
                         ));
                     }
                 }
-                if let Some(o) = other_hand
-                    .filter(|o| o.rms.max(best.rms) < MIRROR_UNSURE * o.rms.min(best.rms).max(INDISTINCT))
-                {
+                let near = |a: f64, b: f64| a.max(b) < MIRROR_UNSURE * a.min(b).max(INDISTINCT);
+                if let Some(o) = other_hand.filter(|o| near(o.residual, best.residual)) {
                     reasons.push(format!(
                         "the other handedness fits as well: {:.3} times the residual",
-                        o.rms / best.rms.max(INDISTINCT)
+                        o.residual / best.residual.max(INDISTINCT)
                     ));
                 }
             }
@@ -463,6 +637,14 @@ impl Search<'_> {
                     reasons.push(format!(
                         "a pose {angle:.0} degrees away scores {:.2} against {:.2}",
                         r.score, best.score
+                    ));
+                }
+                if let Some(o) = other_size.filter(|o| o.score > best.score - s.rival_margin) {
+                    reasons.push(format!(
+                        "{:.2} times that size scores {:.2} against {:.2}",
+                        self.size(o) / self.size(best),
+                        o.score,
+                        best.score
                     ));
                 }
                 if let Some(o) = other_hand.filter(|o| o.score > best.score - s.rival_margin) {
@@ -484,7 +666,7 @@ impl Search<'_> {
         } else {
             DVec3::ONE
         };
-        let linear = c.pose.linear * DMat3::from_diagonal(mirror);
+        let linear = c.pose.linear * DMat3::from_diagonal(mirror * source.size);
         Rigid {
             linear,
             translation: target.centre + c.pose.translation * unit - linear * source.centre,
@@ -499,6 +681,7 @@ impl Search<'_> {
             count: 2000,
             exact: false,
             cosine: 0.5,
+            by_noise: false,
         };
         let (source, target) = self.views(c);
         let rows = equations(source, target, &c.pose, level, level.from);
@@ -508,18 +691,59 @@ impl Search<'_> {
     fn precision(&self, c: &Candidate, unit: f64) -> Option<Precision> {
         let (source, target) = self.views(c);
         let level = resting_level(source, target);
-        let robust = c.method == Method::Partial || surface::ends_close(source, target, c.rms);
+        let robust = c.method == Method::Partial || c.robust || surface::ends_close(source, target, c.rms);
         // An untruncated fit used every pair; beyond four of its distances hardly any is left.
-        let tolerance = if robust {
+        let tolerance = if c.robust {
+            level.to.max(surface::differs_beyond(c.residual))
+        } else if robust {
             level.to
         } else {
             level.to.max(4.0 * c.rms)
         };
-        let found = standard_errors(source, target, &c.pose, level, tolerance, robust)?;
+        let scale = self.settings.scale;
+        let found = standard_errors(source, target, &c.pose, level, tolerance, robust, scale)?;
+        let axes = found.axes.iter().map(|&(axis, error)| AxisPrecision {
+            axis,
+            deg: error.to_degrees(),
+        });
         Some(Precision {
             rotation_deg: found.rotation.to_degrees(),
+            axes: axes.collect(),
             translation_mm: found.translation * unit,
+            scale_percent: found.growth.map(|g| 100.0 * g),
         })
+    }
+
+    /// What the standard errors say against a pose: that it slides, spins or grows too freely.
+    fn uncertainty(&self, best: &Candidate, precision: Option<&Precision>) -> Vec<String> {
+        let mut reasons = Vec::new();
+        let apart = best.other_kind.map(|o| o.rotation_angle_deg(&best.pose));
+        if let Some(angle) = apart.filter(|a| *a > self.settings.uncertain_deg) {
+            reasons.push(format!(
+                "the shapes differ: fitted as wholes and by the part that agrees best they lie {angle:.0} degrees apart"
+            ));
+        }
+        let Some(p) = precision else {
+            reasons.push("what the surfaces share does not say how precisely the pose is held".into());
+            return reasons;
+        };
+        let reach = reach_deg(p);
+        if reach > self.settings.uncertain_deg {
+            let axis = p.axes.first().map_or(DVec3::ZERO, |a| a.axis);
+            reasons.push(format!(
+                "known to plus or minus {reach:.1} degrees (95 %), loosest about the axis ({:.2}, {:.2}, {:.2})",
+                axis.x, axis.y, axis.z
+            ));
+        }
+        if let Some(percent) = p.scale_percent
+            && NINETY_FIVE * percent > self.settings.uncertain_scale_percent
+        {
+            reasons.push(format!(
+                "the size is known to plus or minus {:.0} % (95 %)",
+                NINETY_FIVE * percent
+            ));
+        }
+        reasons
     }
 
     /// Distances and overlap of a pose.

@@ -101,10 +101,12 @@ fn figures(report: &mut Report, r: &Value, motion: &Rigid) {
         .push(KeyFigure::new("Rotation", pretty(angle), "\u{b0}").note(notes.join(", ")));
     if let Some(ok) = at(r, "converged").and_then(Value::as_bool) {
         let ambiguous = at(r, "ambiguous").and_then(Value::as_bool).unwrap_or(false);
-        let (word, good) = match (ok, ambiguous) {
-            (true, false) => ("decided", true),
-            (true, true) => ("ambiguous", false),
-            (false, _) => ("not converged", false),
+        let uncertain = at(r, "uncertain").and_then(Value::as_bool).unwrap_or(false);
+        let (word, good) = match (ok, ambiguous, uncertain) {
+            (true, false, false) => ("decided", true),
+            (true, false, true) => ("uncertain", false),
+            (true, true, _) => ("ambiguous", false),
+            (false, ..) => ("not converged", false),
         };
         report.figures.push(KeyFigure::new("Pose", word, "").check(good));
     }
