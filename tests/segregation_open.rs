@@ -41,7 +41,7 @@ fn a_pair_of_planes_is_two_sheets_with_nothing_between() {
 }
 
 #[test]
-fn crossing_planes_cross_and_every_point_is_used() {
+fn crossing_planes_stay_one_surface_in_two_planes() {
     for (degrees, seed) in [(90.0f64, 4), (60.0, 5)] {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let points = patch(4000, seed, |u, v| {

@@ -78,7 +78,7 @@ impl Domain {
             found += usize::from(is_wall);
             is_wall
         });
-        if found < surface.len() {
+        if found + segregation.loose < surface.len() {
             return Err(FineScaffoldError::Surface {
                 missing: surface.len() - found,
                 triangles: surface.len(),

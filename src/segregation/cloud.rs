@@ -6,7 +6,7 @@
 //! 1. Prepare: outliers, noise, thinning ([`super::prepare`]).
 //! 2. Close ([`super::closure`]), whatever the cloud is: a closed surface shows by its unsupported area how open it is.
 //! 3. Decide: open when 1.5 % or more of the area has no points to support it, 3 % with strong noise (`judge`). An open surface is the
-//!    greedy one, oriented where that can be done ([`super::orient`]).
+//!    greedy one, its sheets joined where they cross ([`super::crossing`]), oriented where that can be done ([`super::orient`]).
 //! 4. Second opinions: for strong noise other thinning seeds and pulls; the run with the least to explain is taken ([`super::runs`]).
 //! 5. Doubt ([`super::self_check`]): the result looks for its own faults.
 //! 6. A doubted result is tried again with the smallest smoothing and, unless the noise is strong, with none, and the first
@@ -16,6 +16,7 @@
 
 use super::balls::Balls;
 use super::closure::{Closure, preset_facets};
+use super::crossing::{Joined, OpenSurface, join_crossings};
 use super::error::SegregationError;
 use super::gap_cost::CostRule;
 use super::gap_transforms::gap_transforms;
@@ -23,7 +24,7 @@ use super::judge::{Judged, sorted};
 use super::labels::Segregation;
 use super::openness::{patches, rims};
 use super::orient::orient;
-use super::prepare::{Strength, clean, thin_out};
+use super::prepare::{Prepared, Strength, clean, thin_out};
 use super::report::{ClosingReport, CloudReport, ComponentReport, Variation};
 use super::runs::{Chosen, Run, choose, opinion_of, run};
 use super::self_check::{doubts, pull_opinions, self_check};
@@ -193,7 +194,9 @@ fn finish(
 ) -> Result<CloudSegregation, SegregationError> {
     let Chosen {
         run: Run {
-            prepared, closure, ..
+            prepared,
+            mut closure,
+            ..
         },
         opinions,
     } = chosen;
@@ -212,10 +215,31 @@ fn finish(
             triangles: judged.triangles,
             inside: closure.inside.clone(),
             closed: true,
+            loose: 0,
             warnings: Vec::new(),
         }
     } else {
-        open_surface(&closure, !known.is_empty(), settings.cost)
+        let given = !known.is_empty();
+        let mut triangles = open_triangles(&closure, given, settings.cost);
+        let mut warnings = Vec::new();
+        let mut loose = 0;
+        if !given && settings.denoise != Denoise::Off {
+            let joined = joined_crossings(points, &prepared, &closure, &triangles)?;
+            if let Some(joined) = joined {
+                warnings.extend(crossing_warnings(&joined));
+                triangles = joined.triangles;
+                report.crossings = joined.crossings;
+                report.crossing_points_added = joined.added;
+                loose = joined.loose;
+                closure.used = joined.origin.iter().map(|&o| closure.used[o as usize]).collect();
+                closure.spacing_mm = joined.spacing_mm;
+                closure.triangulation = joined.triangulation;
+            }
+        }
+        Segregation {
+            loose,
+            ..open_surface(&closure.triangulation.points, &triangles, warnings)
+        }
     };
     report.decision = decision;
     if segregation.closed {
@@ -329,7 +353,7 @@ fn spacing_at_rims(triangles: &[[u32; 3]], spacing_mm: &[f64]) -> Vec<f64> {
 }
 
 /// The greedy surface; found once more with the spacing at its rims put right, unless triangles were given.
-fn open_surface(closure: &Closure, given: bool, cost: CostRule) -> Segregation {
+fn open_triangles(closure: &Closure, given: bool, cost: CostRule) -> Vec<[u32; 3]> {
     let triangulation = &closure.triangulation;
     let corners = |facets: &[Facet]| -> Vec<[u32; 3]> {
         facets
@@ -337,15 +361,63 @@ fn open_surface(closure: &Closure, given: bool, cost: CostRule) -> Segregation {
             .map(|&f| super::labels::smallest_first(triangulation.facet_vertices(f)).map(|v| v.0))
             .collect()
     };
-    let mut triangles = corners(&closure.greedy.facets);
-    if !given {
-        let spacing = spacing_at_rims(&triangles, &closure.spacing_mm);
-        let balls = Balls::new(triangulation);
-        let again = gap_transforms(triangulation, &balls, &closure.depths, &spacing, cost, &[]);
-        triangles = corners(&again.facets);
+    let triangles = corners(&closure.greedy.facets);
+    if given {
+        return triangles;
     }
-    let oriented = orient(&closure.triangulation.points, &triangles);
-    let mut warnings = Vec::new();
+    let spacing = spacing_at_rims(&triangles, &closure.spacing_mm);
+    let balls = Balls::new(triangulation);
+    let again = gap_transforms(triangulation, &balls, &closure.depths, &spacing, cost, &[]);
+    corners(&again.facets)
+}
+
+/// Where the sheets of an open surface cross they are joined.
+fn joined_crossings(
+    points: &[DVec3],
+    prepared: &Prepared,
+    closure: &Closure,
+    triangles: &[[u32; 3]],
+) -> Result<Option<Joined>, SegregationError> {
+    let measured: Vec<DVec3> = closure
+        .used
+        .iter()
+        .map(|&i| points[prepared.source[i as usize] as usize])
+        .collect();
+    Ok(join_crossings(&OpenSurface {
+        points: &closure.triangulation.points,
+        measured: &measured,
+        spacing_mm: &closure.spacing_mm,
+        triangles,
+        noise_over_spacing: match prepared.report.passes {
+            0 => 0.0,
+            _ => prepared.report.noise_over_spacing,
+        },
+    })?)
+}
+
+fn crossing_warnings(joined: &Joined) -> Vec<String> {
+    let mut out: Vec<String> = joined
+        .crossings
+        .iter()
+        .map(|c| {
+            format!(
+                "{} half sheets meet along {:.3} mm ({} edges) round ({:.3}, {:.3}, {:.3}): {} points within half a spacing of the line are replaced by points on it",
+                c.half_sheets, c.length_mm, c.edges, c.place.x, c.place.y, c.place.z, c.replaced_points
+            )
+        })
+        .collect();
+    if joined.loose > 0 {
+        out.push(format!(
+            "{} triangles near crossings are no facets of the triangulation: the scaffold passes through them",
+            joined.loose
+        ));
+    }
+    out
+}
+
+/// Triangles turned alike as far as they can be.
+fn open_surface(points: &[DVec3], triangles: &[[u32; 3]], mut warnings: Vec<String>) -> Segregation {
+    let oriented = orient(points, triangles);
     if !oriented.orientable {
         warnings.push(
             "the surface is not orientable: its triangles are turned alike only piece by piece".to_owned(),
@@ -355,6 +427,7 @@ fn open_surface(closure: &Closure, given: bool, cost: CostRule) -> Segregation {
         triangles: oriented.triangles.iter().map(|t| t.map(VertexId)).collect(),
         inside: Vec::new(),
         closed: false,
+        loose: 0,
         warnings,
     }
 }

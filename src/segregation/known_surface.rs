@@ -186,6 +186,7 @@ pub fn segregate_known(
             triangles,
             inside,
             closed: true,
+            loose: 0,
             warnings,
         },
         report: KnownSurfaceReport {

@@ -12,6 +12,8 @@ pub struct Segregation {
     pub inside: Vec<bool>,
     /// Whether the surface was taken to be closed.
     pub closed: bool,
+    /// Triangles near crossings of an open surface that are no facets of the triangulation; the scaffold has no walls there.
+    pub loose: usize,
     /// What a user should know, in plain words.
     pub warnings: Vec<String>,
 }

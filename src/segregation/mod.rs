@@ -7,7 +7,7 @@
 //!   generators where that does not give the surface's topology, and [`known_repair`] changes the last labels that no sampling would.
 //! * [`cloud`]: a raw cloud is prepared ([`prepare`]: outliers, noise), shows its surface by greedy gap transforms
 //!   ([`gap_transforms`] at the price of [`gap_cost`]), is closed ([`closure`]: [`diffusion`], [`labelling`] with [`min_cut`], [`islands`],
-//!   [`star_repair`], [`adopt`], [`handles`]), judged open or closed (`judge`, [`openness`]), tried otherwise where noise is strong (`runs`), oriented ([`orient`]), reported
+//!   [`star_repair`], [`adopt`], [`handles`]), judged open or closed (`judge`, [`openness`]), joined where open sheets cross ([`crossing`]), tried otherwise where noise is strong (`runs`), oriented ([`orient`]), reported
 //!   ([`report`]) and looked over for faults ([`self_check`]).
 //! * [`mesh_repair`]: a damaged mesh keeps its good triangles; the rest is found anew from its points. [`mend()`] closes holes.
 
@@ -15,6 +15,7 @@ pub mod adopt;
 pub mod balls;
 pub mod closure;
 pub mod cloud;
+pub mod crossing;
 pub mod diffusion;
 pub mod error;
 pub mod facets;
@@ -46,6 +47,7 @@ mod stars;
 
 pub use balls::Balls;
 pub use cloud::{CloudSegregation, segregate_cloud};
+pub use crossing::Crossing;
 pub use error::SegregationError;
 pub use gap_cost::CostRule;
 pub use known_queries::KnownSurface;

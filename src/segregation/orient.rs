@@ -1,7 +1,7 @@
 //! Orientation of an open surface, as far as one exists.
 //!
-//! In: triangles. Out: the same triangles, each component turned alike from its first triangle on across edges with exactly
-//! two triangles, and whether that met no contradiction (a Moebius band does). Closed components are turned outward by their
+//! In: triangles. Out: the same triangles, each component turned alike from its first triangle on across edges with two
+//! triangles and, where sheets cross, from each half sheet to the one that goes straight on, and whether that met no contradiction (a Moebius band does). Closed components are turned outward by their
 //! signed volume. `O(n log n)`.
 
 use super::openness::area;
@@ -41,7 +41,7 @@ pub fn orient(points: &[DVec3], triangles: &[[u32; 3]]) -> Oriented {
     // Neighbours across manifold edges, with whether both run the edge the same way (then one must be turned).
     let mut links: Vec<Vec<(u32, bool)>> = vec![Vec::new(); triangles.len()];
     for run in sides.chunk_by(|a, b| a.edge == b.edge) {
-        if let [a, b] = run {
+        for (a, b) in straight_on(points, triangles, run) {
             let turn = a.forward == b.forward;
             links[a.triangle as usize].push((b.triangle, turn));
             links[b.triangle as usize].push((a.triangle, turn));
@@ -81,6 +81,45 @@ pub fn orient(points: &[DVec3], triangles: &[[u32; 3]]) -> Oriented {
         turn_outward(points, &mut out.triangles, &members);
     }
     out
+}
+
+/// Least cosine between one triangle and the straight continuation of another across an edge with more than two (45 degrees).
+const STRAIGHT: f64 = 0.7;
+
+/// The triangles at an edge that are one surface: both of two; of more, those that go straight on, the straightest first.
+fn straight_on(points: &[DVec3], triangles: &[[u32; 3]], run: &[Side]) -> Vec<(Side, Side)> {
+    match run {
+        [_] => Vec::new(),
+        [a, b] => vec![(*a, *b)],
+        _ => {
+            let (i, j) = run[0].edge;
+            let (from, to) = (points[i as usize], points[j as usize]);
+            let along = (to - from).normalize_or_zero();
+            let away = |s: &Side| {
+                let third = triangles[s.triangle as usize]
+                    .into_iter()
+                    .find(|&v| v != i && v != j);
+                let d = third.map_or(DVec3::ZERO, |v| points[v as usize] - from);
+                (d - d.dot(along) * along).normalize_or_zero()
+            };
+            let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
+            for m in 0..run.len() {
+                for n in 0..m {
+                    pairs.push((-away(&run[m]).dot(away(&run[n])), n, m));
+                }
+            }
+            pairs.sort_by(|p, q| q.0.total_cmp(&p.0).then((p.1, p.2).cmp(&(q.1, q.2))));
+            let mut taken = vec![false; run.len()];
+            let mut out = Vec::new();
+            for (straightness, n, m) in pairs {
+                if straightness >= STRAIGHT && !taken[n] && !taken[m] {
+                    (taken[n], taken[m]) = (true, true);
+                    out.push((run[n], run[m]));
+                }
+            }
+            out
+        }
+    }
 }
 
 /// A component is turned so that its signed volume about its centroid is positive: outward when it is closed, away from

@@ -1,5 +1,6 @@
 //! What a segregation of a raw cloud says of itself: decisions, numbers, holes, doubts.
 
+use super::crossing::Crossing;
 use super::islands::Island;
 use super::labelling::RemovedHandle;
 use super::mesh_repair::MeshRepairReport;
@@ -25,6 +26,10 @@ pub struct CloudReport {
     pub filled_holes: Vec<Patch>,
     /// Borders of the surface: holes that were left.
     pub rims: Vec<Rim>,
+    /// Lines where half sheets of an open surface meet; the edges with three or more triangles are theirs and no damage.
+    pub crossings: Vec<Crossing>,
+    /// Points added on triangles near crossings, so that all are facets of the triangulation.
+    pub crossing_points_added: usize,
     /// Small parts that were removed or filled.
     pub islands: Vec<Island>,
     /// Counts of the closing stage.

@@ -82,7 +82,12 @@ fn kernel(points: &[DVec3], lists: &KnnLists, i: usize, plan: &SmoothingPlan) ->
 }
 
 /// Where one point goes; `None` when its neighbours determine no surface.
-fn project(points: &[DVec3], list: &[u32], origin: DVec3, noise_over_spacing: f64) -> Option<DVec3> {
+pub(in crate::segregation) fn project(
+    points: &[DVec3],
+    list: &[u32],
+    origin: DVec3,
+    noise_over_spacing: f64,
+) -> Option<DVec3> {
     let list = &list[..list.len().min(MOST)];
     let k = list.len();
     let near = list.iter().map(|&j| points[j as usize]);
