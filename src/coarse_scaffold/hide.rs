@@ -50,9 +50,9 @@ pub(crate) fn hide(network: &mut Network, settings: &CoarseScaffoldSettings) {
         let Some((persistence, chain)) = weakest else {
             break;
         };
-        let v = chain.vertices[0] as usize;
-        let tau = network.regularised.tolerance_at(network.fine.vertex_radius[v]);
-        let place = network.fine.vertex_position[v];
+        let v = chain.vertices[0];
+        let tau = network.regularised.tolerance_at(v);
+        let place = network.fine.vertex_position[v as usize];
         // A stub between a curve and the seam that closes its gap is part of the seam.
         let stub = Cells::path(&chain.edges);
         if network.length(&chain.edges) <= settings.contract_seam * tau
@@ -106,8 +106,7 @@ fn drop_seams_of_crumbs(network: &mut Network) -> bool {
 pub(crate) fn is_crumb(network: &Network, facets: &[u32]) -> bool {
     facets.iter().all(|&f| {
         let ring = network.fine.facet_vertices(f as usize);
-        let sum: f64 = ring.iter().map(|&v| network.fine.vertex_radius[v as usize]).sum();
-        let tau = network.regularised.tolerance_at(sum / ring.len() as f64);
+        let tau = network.regularised.tolerance_over(ring);
         network.regularised.erosion_mm[f as usize] < network.regularised.cut * tau
     })
 }
@@ -170,9 +169,8 @@ fn hide_chain(network: &mut Network, chain: &Chain) {
 /// Largest third-highest erosion thickness along an axial curve, in tolerances.
 fn relative_persistence(network: &Network, chain: &Chain) -> f64 {
     let value = |&e: &u32| {
-        let [a, b] = network.fine.edge_vertices[e as usize];
-        let radius = 0.5 * (network.fine.vertex_radius[a as usize] + network.fine.vertex_radius[b as usize]);
-        network.third_erosion(e) / network.regularised.tolerance_at(radius)
+        let ends = &network.fine.edge_vertices[e as usize];
+        network.third_erosion(e) / network.regularised.tolerance_over(ends)
     };
     chain.edges.iter().map(value).fold(0.0, f64::max)
 }
@@ -185,9 +183,8 @@ fn is_whisker(network: &Network, chain: &Chain, longest: f64) -> bool {
         network.alive_edges(v).filter(shown).count()
     };
     let holds_facet = |v: u32| network.alive_edges(v).any(|e| network.facets(e).next().is_some());
-    let tau = network.regularised.tolerance_at(
-        network.fine.vertex_radius[last as usize].max(network.fine.vertex_radius[first as usize]),
-    );
+    let at = |v: u32| network.regularised.tolerance_at(v);
+    let tau = at(first).max(at(last));
     chain.kind == CurveKind::Wire
         && (edges_at(first) == 1 && holds_facet(last) || edges_at(last) == 1 && holds_facet(first))
         && network.length(&chain.edges) <= 1.5 * longest * tau.max(network.fine.scale.spacing_mm)

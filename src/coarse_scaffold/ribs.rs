@@ -85,7 +85,7 @@ pub(crate) fn fit_ribs(
         };
         let width_mm = RIB_WIDTH * width_mm;
         smooth(line, free[i], width_mm);
-        let fade = fade(line, free[i], regularised);
+        let fade = fade(line, &chains[i].vertices, free[i], regularised);
         let (own, tree) = &samples[sheet as usize];
         let fits: Vec<Vec<Option<Fit>>> = POWERS
             .iter()
@@ -110,7 +110,7 @@ pub(crate) fn fit_ribs(
 }
 
 /// How much of the fit counts at each point: 1 away from the ends and at thin ends, 0 at thick ones.
-fn fade(line: &[MedialPoint], closed: bool, regularised: &Regularised) -> Vec<f64> {
+fn fade(line: &[MedialPoint], vertices: &[u32], closed: bool, regularised: &Regularised) -> Vec<f64> {
     let mut fade = vec![1.0; line.len()];
     if closed {
         return fade;
@@ -121,7 +121,7 @@ fn fade(line: &[MedialPoint], closed: bool, regularised: &Regularised) -> Vec<f6
             let here = line[i].position;
             match last {
                 None => {
-                    let tau = regularised.tolerance_at(line[i].radius);
+                    let tau = regularised.tolerance_at(vertices[i]);
                     if line[i].radius <= THICK * tau {
                         return;
                     }

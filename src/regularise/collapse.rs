@@ -121,7 +121,7 @@ impl WireFire {
             let Some(edge) = complex.wire_at_tip(v) else {
                 continue;
             };
-            let limit = factor * measure.tolerance.at(complex.fine.vertex_radius[v as usize]);
+            let limit = factor * measure.tolerance.at(v);
             if key >= limit {
                 continue;
             }

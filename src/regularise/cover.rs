@@ -40,7 +40,7 @@ impl Cover {
         let mut first = vec![NONE; fine.num_vertices()];
         let n = fine.generator_position.len();
         let mut next = vec![NONE; n];
-        let (touching, best) = touching_vertices(complex);
+        let (touching, best) = touching_vertices(complex, measure);
         let tolerance = known.map_or_else(
             || {
                 (0..n)
@@ -48,7 +48,7 @@ impl Cover {
                         if best[g] == NONE {
                             f64::INFINITY
                         } else {
-                            measure.tolerance.at(fine.vertex_radius[best[g] as usize])
+                            measure.tolerance.at(best[g])
                         }
                     })
                     .collect()
@@ -135,14 +135,15 @@ impl Cover {
     }
 }
 
-/// For each generator an alive vertex of its Voronoi cell (whose ball it touches), and the largest ball of its cell in the
-/// whole fine scaffold: the medial ball that gives its tolerance.
-fn touching_vertices(complex: &Complex) -> (Vec<u32>, Vec<u32>) {
+/// For each generator an alive vertex of its Voronoi cell (whose ball it touches), and the ball of its cell in the
+/// whole fine scaffold that gives its tolerance: of those of the thickest part the largest.
+fn touching_vertices(complex: &Complex, measure: &Measure) -> (Vec<u32>, Vec<u32>) {
     let fine = complex.fine;
     let n = fine.generator_position.len();
     let (mut touching, mut largest) = (vec![NONE; n], vec![NONE; n]);
     let offer = |slot: &mut u32, v: u32| {
-        let better = *slot == NONE || fine.vertex_radius[v as usize] > fine.vertex_radius[*slot as usize];
+        let size = |v: u32| (measure.tolerance.at(v), fine.vertex_radius[v as usize]);
+        let better = *slot == NONE || size(v) > size(*slot);
         if better && !fine.vertex_outside[v as usize] {
             *slot = v;
         }

@@ -126,8 +126,8 @@ pub(crate) fn trim_fins(
         let vertices = removed_vertices(complex, since);
         fire.prune_from(complex, measure, wire * limit, &vertices);
         let place = measure.edge_middle[chain.edges[chain.edges.len() / 2] as usize];
-        let radius = measure.edge_radius[chain.edges[0] as usize];
-        let cost = chain.persistence * measure.tolerance.at(radius);
+        let start = &complex.fine.edge_vertices[chain.edges[0] as usize];
+        let cost = chain.persistence * measure.tolerance.over(start);
         let movement = cover.movement(complex, since, Some(1.0), 1.0);
         if movement.worst > 1.0
             || still_axial(complex) && complex.log.len() - since > 4 * chain.edges.len() + 64

@@ -78,7 +78,7 @@ pub(crate) fn trim_fringes(
 /// The connected pieces of fringe, in order of their smallest facet.
 fn pieces(complex: &Complex, measure: &Measure, relative: &[f64], fringe: Fringe) -> Vec<Vec<u32>> {
     let n = complex.fine.num_facets();
-    let width = |f: u32| fringe.width * measure.tolerance.at(measure.facet_radius[f as usize]);
+    let width = |f: u32| fringe.width * measure.tolerance.over(complex.fine.facet_vertices(f as usize));
     let from_ribs = (0..n as u32)
         .filter(|&f| complex.facet_alive[f as usize])
         .filter_map(|f| {

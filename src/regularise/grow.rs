@@ -132,7 +132,7 @@ pub(crate) fn grow_wires(complex: &mut Complex, measure: &Measure, fire: &WireFi
                 continue;
             }
             if let Some(erosion) = fire.erosion(complex, v) {
-                let value = erosion / measure.tolerance.at(fine.vertex_radius[v as usize]);
+                let value = erosion / measure.tolerance.at(v);
                 if value >= least {
                     queue.push(-value, e);
                 }

@@ -1,5 +1,6 @@
 //! Coordinates enter here: lengths of the fine scaffold's elements, and the tolerance at each of them.
 
+use super::parts::part_radii;
 use crate::fine_scaffold::FineScaffold;
 use crate::geometry::Length;
 use glam::DVec3;
@@ -18,34 +19,70 @@ pub(crate) struct Measure {
     pub facet_radius: Vec<f64>,
     /// Area of each facet.
     pub facet_area: Vec<f64>,
-    /// Tolerance by the radius it is used at.
+    /// Tolerance at each place.
     pub tolerance: Tolerance,
 }
 
-/// The tolerance in mm: one number, or a multiple of the local radius.
-#[derive(Clone, Copy, Debug)]
+/// The tolerance in mm: one number, or a multiple of the radius of the part of the solid that a place belongs to.
+#[derive(Clone, Debug)]
 pub(crate) struct Tolerance {
-    length: Length,
-    scale: crate::geometry::LengthScale,
+    everywhere_mm: f64,
+    /// One value a vertex, mm; none when the tolerance is the same everywhere.
+    at_vertex_mm: Vec<f64>,
 }
 
 impl Tolerance {
+    /// Relative to the radius it is a share of [`part_radii`], but never below a spacing, under which there is only sampling.
     pub fn new(length: Length, fine: &FineScaffold) -> Self {
+        let at_vertex_mm: Vec<f64> = match length {
+            Length::LocalRadii(_) => part_radii(fine)
+                .into_iter()
+                .map(|radius| length.to_mm(fine.scale, radius).max(fine.scale.spacing_mm))
+                .collect(),
+            _ => Vec::new(),
+        };
+        let inside = at_vertex_mm.iter().zip(&fine.vertex_outside);
+        let largest = inside.filter(|(_, outside)| !**outside).map(|(t, _)| *t).fold(0.0, f64::max);
         Self {
-            length,
-            scale: fine.scale,
+            everywhere_mm: if at_vertex_mm.is_empty() {
+                length.to_mm(fine.scale, 0.0)
+            } else {
+                largest
+            },
+            at_vertex_mm,
         }
     }
 
-    /// Tolerance at a medial point of the given radius, mm; relative to the radius it is never below a spacing, under which
-    /// there is only sampling.
+    /// The largest there is, mm.
+    pub fn largest(&self) -> f64 {
+        self.everywhere_mm
+    }
+
+    /// At a vertex, mm.
     #[inline]
-    pub fn at(&self, radius_mm: f64) -> f64 {
-        let tau = self.length.to_mm(self.scale, radius_mm.abs());
-        match self.length {
-            Length::LocalRadii(_) => tau.max(self.scale.spacing_mm),
-            _ => tau,
+    pub fn at(&self, vertex: u32) -> f64 {
+        if self.at_vertex_mm.is_empty() {
+            self.everywhere_mm
+        } else {
+            self.at_vertex_mm[vertex as usize]
         }
+    }
+
+    /// The mean over some vertices, mm.
+    pub fn over(&self, vertices: &[u32]) -> f64 {
+        if self.at_vertex_mm.is_empty() || vertices.is_empty() {
+            return self.everywhere_mm;
+        }
+        vertices.iter().map(|&v| self.at(v)).sum::<f64>() / vertices.len() as f64
+    }
+
+    /// The largest over the vertices of some facets, mm.
+    pub fn of_facets(&self, fine: &FineScaffold, facets: &[u32]) -> f64 {
+        if self.at_vertex_mm.is_empty() {
+            return self.everywhere_mm;
+        }
+        let vertices = facets.iter().flat_map(|&f| fine.facet_vertices(f as usize));
+        vertices.map(|&v| self.at(v)).fold(0.0, f64::max)
     }
 }
 

@@ -29,6 +29,7 @@ pub(crate) mod fringe;
 pub(crate) mod grow;
 pub mod history;
 pub(crate) mod measure;
+pub(crate) mod parts;
 pub(crate) mod queue;
 pub(crate) mod seams;
 pub mod settings;

@@ -33,8 +33,7 @@ pub(crate) fn find_seams(
     let mut is_seam = vec![false; fine.num_edges()];
     let mut seams = Vec::new();
     for v in 0..fine.num_vertices() as u32 {
-        let radius = fine.vertex_radius[v as usize];
-        let tau = measure.tolerance.at(radius);
+        let tau = measure.tolerance.at(v);
         if degree[v as usize] != 1 {
             continue;
         }

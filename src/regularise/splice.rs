@@ -175,7 +175,7 @@ impl Splicer<'_> {
                 complex.undo_to(since);
                 history.push(Event::skipped(
                     Kind::Splice,
-                    self.mm(&facets, cost),
+                    self.mm(complex, &facets, cost),
                     self.place(&facets),
                 ));
                 continue;
@@ -183,7 +183,7 @@ impl Splicer<'_> {
             cover.accept(complex, since, movement);
             history.push(Event::applied(
                 Kind::Splice,
-                self.mm(&facets, cost),
+                self.mm(complex, &facets, cost),
                 self.place(&facets),
                 since,
                 complex.log.len(),
@@ -244,11 +244,7 @@ impl Splicer<'_> {
             return (generators.len() < threshold as usize).then_some(generators.len() as f64);
         }
         let area: f64 = facets.iter().map(|&f| self.measure.facet_area[f as usize]).sum();
-        let radius = facets
-            .iter()
-            .map(|&f| self.measure.facet_radius[f as usize])
-            .fold(0.0, f64::max);
-        let tau = self.measure.tolerance.at(radius);
+        let tau = self.measure.tolerance.of_facets(fine, &facets);
         let largest = facets
             .iter()
             .map(|&f| self.relative[f as usize])
@@ -320,15 +316,11 @@ impl Splicer<'_> {
         true
     }
 
-    fn mm(&self, facets: &[u32], cost: f64) -> f64 {
+    fn mm(&self, complex: &Complex, facets: &[u32], cost: f64) -> f64 {
         if self.count.is_some() {
             return cost;
         }
-        let radius = facets
-            .iter()
-            .map(|&f| self.measure.facet_radius[f as usize])
-            .fold(0.0, f64::max);
-        cost * self.measure.tolerance.at(radius)
+        cost * self.measure.tolerance.of_facets(complex.fine, facets)
     }
 
     /// Where a sheet is: the centre of its thickest facet.

@@ -51,7 +51,7 @@ pub struct Regularised {
     pub betti: Vec<StageBetti>,
     /// Distance from the generators to the union of the medial balls that are left.
     pub fidelity: Fidelity,
-    /// The tolerance, mm; with a tolerance relative to the radius, that at the largest radius.
+    /// The tolerance, mm; with a tolerance relative to the radius, that of the thickest part.
     pub tolerance_mm: f64,
     /// What was cheapest first.
     pub cost: Cost,
@@ -64,9 +64,14 @@ pub struct Regularised {
 }
 
 impl Regularised {
-    /// The tolerance at a medial point of the given radius, mm.
-    pub fn tolerance_at(&self, radius_mm: f64) -> f64 {
-        self.local_tolerance.at(radius_mm)
+    /// The tolerance at a vertex of the fine scaffold, mm.
+    pub fn tolerance_at(&self, vertex: u32) -> f64 {
+        self.local_tolerance.at(vertex)
+    }
+
+    /// The mean tolerance over some vertices, mm.
+    pub(crate) fn tolerance_over(&self, vertices: &[u32]) -> f64 {
+        self.local_tolerance.over(vertices)
     }
 
     /// The Betti numbers, the same at every stage.
@@ -178,11 +183,7 @@ impl<'a> Run<'a> {
     }
 
     fn largest_tolerance(&self) -> f64 {
-        let largest = self.fine.vertex_radius.iter().zip(&self.fine.vertex_outside);
-        self.measure.tolerance.at(largest
-            .filter(|(_, outside)| !**outside)
-            .map(|(r, _)| *r)
-            .fold(0.0, f64::max))
+        self.measure.tolerance.largest()
     }
 
     fn burn(&mut self) {
@@ -190,8 +191,8 @@ impl<'a> Run<'a> {
         self.relative = self
             .erosion
             .iter()
-            .zip(&self.measure.facet_radius)
-            .map(|(et, &r)| et / self.measure.tolerance.at(r))
+            .enumerate()
+            .map(|(f, et)| et / self.measure.tolerance.over(self.fine.facet_vertices(f)))
             .collect();
     }
 

@@ -43,7 +43,7 @@ pub(crate) fn remove_small_wires(
             continue;
         }
         cover.accept(complex, since, movement);
-        let tau = measure.tolerance.at(fine.vertex_radius[tip as usize]);
+        let tau = measure.tolerance.at(tip);
         history.push(Event::applied(
             Kind::PruneWires,
             length.min(limit * tau),
@@ -92,7 +92,7 @@ pub(crate) fn whiskers(complex: &Complex, measure: &Measure, longest: f64) -> Ve
     let mut whisker = vec![false; fine.num_edges()];
     for (i, &e) in wires.iter().enumerate() {
         let root = trees.find(i as u32) as usize;
-        let tau = measure.tolerance.at(measure.edge_radius[e as usize]);
+        let tau = measure.tolerance.over(&fine.edge_vertices[e as usize]);
         whisker[e as usize] = on_sheet[root] && length[root] <= longest * tau;
     }
     whisker
