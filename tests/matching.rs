@@ -35,6 +35,7 @@ fn scaffold(fin: f64, fin_persistence: f64) -> CoarseScaffold {
             position: m.position,
             radius: m.radius,
             curves: vec![CurveId(0), CurveId(2)],
+            sheets: Vec::new(),
             persistence: fin_persistence,
         })
         .collect();

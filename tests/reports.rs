@@ -59,6 +59,7 @@ fn scaffold() -> CoarseScaffold {
         position: p.position,
         radius: p.radius,
         curves: vec![CurveId(0)],
+        sheets: Vec::new(),
         persistence: 0.5,
     };
     let (c, d) = (m(10.0, 10.0, 1.0, 1.0), m(10.0, 0.0, 1.0, 1.5));

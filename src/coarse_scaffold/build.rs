@@ -4,8 +4,8 @@
 //!
 //! 1. [`super::network`]: nodes, chains and sheets;
 //! 2. persistence: of a sheet its largest erosion thickness (ET), of an axial curve the largest third-highest ET along it, of a
-//!    wire the largest ET of its vertices, of a rib that of its sheet, of a seam that of the axial curve it goes on from.
-//!    What no fire reaches (closed sheets, wires between other elements) cannot go at any price: it gets the diagonal;
+//!    wire how far the surface moves without it ([`super::wires`]), of a rib that of its sheet, of a seam that of the axial curve it goes on from.
+//!    What cannot go without another topology (closed sheets, wires round a tunnel) gets the diagonal, and nothing else does;
 //! 3. [`super::ribs`]: ribs smoothed and fitted; attributes: polylines, lengths, areas, radii, moments, meshes;
 //! 4. [`super::dissolve`]: nodes where only two ribs, or two pieces of one axial curve, are left go;
 //! 5. the generator map: the sheet that most of a generator's Voronoi facets by area belong to, else what holds the nearest ball.
@@ -14,6 +14,7 @@
 
 use super::attributes;
 use super::contract::{contract, thickest};
+use super::corners::{cut_at_corners, straighten};
 use super::dissolve::dissolve;
 use super::generators::generator_hosts;
 use super::hypergraph::{CoarseScaffold, Curve, CurveKind, FineLinks, MedialPoint, Node, NodeKind, Sheet};
@@ -21,6 +22,7 @@ use super::natural::natural_tolerances;
 use super::network::{Chain, Network};
 use super::ribs::fit_ribs;
 use super::settings::CoarseScaffoldSettings;
+use super::wires::wire_persistence;
 use crate::fine_scaffold::FineScaffold;
 use crate::fine_scaffold::complex::NONE;
 use crate::geometry::{CurveId, NodeId, SheetId};
@@ -40,6 +42,7 @@ pub fn coarse_scaffold(
     let mut network = Network::new(fine, regularised);
     let tau = regularised.tolerance_mm;
     contract(&mut network, settings);
+    cut_at_corners(&mut network);
     let node_vertices = network.nodes();
     let mut node_of_vertex = vec![NONE; fine.num_vertices()];
     for (i, vertices) in node_vertices.iter().enumerate() {
@@ -58,7 +61,13 @@ pub fn coarse_scaffold(
     let never = fine.scale.diagonal_mm;
     let sheet_persistence: Vec<f64> = sheet_facets
         .iter()
-        .map(|facets| largest(facets.iter().map(|&f| regularised.erosion_mm[f as usize]), never))
+        .map(|facets| {
+            let persistence = |&f: &u32| {
+                let ring = fine.facet_vertices(f as usize);
+                regularised.persistence(regularised.erosion_mm[f as usize], ring)
+            };
+            facets.iter().map(persistence).fold(0.0, f64::max)
+        })
         .collect();
     let sheets_of_chain: Vec<Vec<SheetId>> = chains
         .iter()
@@ -81,22 +90,37 @@ pub fn coarse_scaffold(
         &node_of_vertex,
         settings,
     );
-    let node_points = node_points(fine, &node_vertices, &chains, &lines, &node_of_vertex);
+    let mut node_points = node_points(fine, &node_vertices, &chains, &lines, &node_of_vertex);
+    let is_corner: Vec<bool> = node_vertices
+        .iter()
+        .map(|vertices| vertices.iter().any(|&v| network.corner[v as usize]))
+        .collect();
+    let ends: Vec<Option<[usize; 2]>> = chains.iter().map(|c| ends_of(c, &node_of_vertex)).collect();
+    straighten(&network, &chains, &ends, &is_corner, &mut lines, &mut node_points);
     for (chain, line) in chains.iter().zip(&mut lines) {
         if chain.kind == CurveKind::Rib {
             pin(
                 line,
                 ends_of(chain, &node_of_vertex),
                 &node_points,
-                settings.contract_seam * tau,
-                settings.smoothing * tau,
+                settings.contract_seam * regularised.tolerance_over(&chain.vertices),
+                settings.smoothing * regularised.tolerance_over(&chain.vertices),
             );
         }
+    }
+    for (chain, line) in chains.iter().zip(&mut lines) {
+        let width_mm = settings.smoothing * regularised.tolerance_over(&chain.vertices);
+        reach_nodes(line, ends_of(chain, &node_of_vertex), &node_points, width_mm);
     }
     let mut border: BTreeMap<u32, MedialPoint> = BTreeMap::new();
     for (chain, line) in chains.iter().zip(&lines) {
         border.extend(chain.vertices.iter().copied().zip(line.iter().copied()));
     }
+    // What a node holds is drawn as the point it is: else there would be holes, and borders that no curve runs along.
+    for (vertices, &point) in node_vertices.iter().zip(&node_points) {
+        border.extend(vertices.iter().map(|&v| (v, point)));
+    }
+    let wire_persistence = wire_persistence(&network, &chains, &sheet_facets, &sheet_persistence);
     let mut curves: Vec<Curve> = chains
         .iter()
         .zip(sheets_of_chain)
@@ -104,20 +128,21 @@ pub fn coarse_scaffold(
         .enumerate()
         .map(|(i, ((chain, sheets), line))| {
             let persistence = match chain.kind {
-                CurveKind::Axial => largest(chain.edges.iter().map(|&e| network.third_erosion(e)), never),
+                CurveKind::Axial => axial_persistence(&network, chain),
                 CurveKind::Rib => sheet_persistence[sheets[0].index()],
-                CurveKind::Wire => wire_persistence(regularised, chain, never),
+                CurveKind::Wire => wire_persistence[i],
                 CurveKind::Seam => 0.0,
             };
-            let ends = ends_of(chain, &node_of_vertex);
-            let line = reach_nodes(line, ends, &node_points, settings.smoothing * tau);
             curve(chain, i, sheets, persistence, &node_of_vertex, line)
         })
         .collect();
     let mut curve_edges: Vec<Vec<u32>> = chains.into_iter().map(|c| c.edges).collect();
-    let number = dissolve(&mut curves, &mut curve_edges, node_points.len());
+    let number = dissolve(&mut curves, &mut curve_edges, &is_corner);
     let (node_points, node_vertices) = left(&number, node_points, node_vertices, &mut node_of_vertex);
     let mut nodes = nodes(&node_points, &curves);
+    for (node, vertices) in nodes.iter_mut().zip(&node_vertices) {
+        node.sheets = sheets_at(fine, vertices, &sheet_of_facet);
+    }
     seam_persistence(&mut curves, &nodes);
     for node in &mut nodes {
         node.persistence = node_persistence(&node.curves, &curves);
@@ -169,19 +194,12 @@ fn left(
         .unzip()
 }
 
-/// Largest value, capped at `never`.
-fn largest(values: impl Iterator<Item = f64>, never: f64) -> f64 {
-    values.fold(0.0, f64::max).min(never)
-}
-
-fn wire_persistence(regularised: &Regularised, chain: &Chain, never: f64) -> f64 {
-    // Fire comes along a wire from its tip; a wire that no fire has crossed whole holds the shape together.
-    let inner = chain
-        .vertices
-        .iter()
-        .map(|&v| regularised.wire_erosion_mm[v as usize]);
-    let unburnt = inner.clone().any(f64::is_nan);
-    if unburnt { never } else { largest(inner, never) }
+fn axial_persistence(network: &Network, chain: &Chain) -> f64 {
+    let persistence = |&e: &u32| {
+        let ends = &network.fine.edge_vertices[e as usize];
+        network.regularised.persistence(network.third_erosion(e), ends)
+    };
+    chain.edges.iter().map(persistence).fold(0.0, f64::max)
 }
 
 fn seam_persistence(curves: &mut [Curve], nodes: &[Node]) {
@@ -209,7 +227,6 @@ fn polylines(
     node_of_vertex: &[u32],
     settings: &CoarseScaffoldSettings,
 ) -> Vec<Vec<MedialPoint>> {
-    let width_mm = settings.smoothing * regularised.tolerance_mm;
     let free: Vec<bool> = chains
         .iter()
         .map(|c| node_of_vertex[c.vertices[0] as usize] == NONE)
@@ -227,6 +244,7 @@ fn polylines(
                 })
                 .collect();
             if chain.kind != CurveKind::Rib {
+                let width_mm = settings.smoothing * regularised.tolerance_over(&chain.vertices);
                 attributes::smooth(&mut line, free, width_mm);
             }
             line
@@ -241,7 +259,7 @@ fn polylines(
         sheet_facets,
         &mut lines,
         &free,
-        width_mm,
+        settings.smoothing,
     );
     lines
 }
@@ -342,29 +360,15 @@ fn pin(
     }
 }
 
-/// A line lengthened to its nodes.
-fn reach_nodes(
-    mut line: Vec<MedialPoint>,
-    ends: Option<[usize; 2]>,
-    nodes: &[MedialPoint],
-    width_mm: f64,
-) -> Vec<MedialPoint> {
-    let (Some([a, b]), Some(first), Some(last)) = (ends, line.first().copied(), line.last().copied()) else {
-        return line;
+/// Puts the ends of a line on its nodes and smooths it where they were not there.
+fn reach_nodes(line: &mut [MedialPoint], ends: Option<[usize; 2]>, nodes: &[MedialPoint], width_mm: f64) {
+    let (Some([a, b]), [first, .., last]) = (ends, &mut *line) else {
+        return;
     };
-    let mut longer = false;
-    if first != nodes[a] {
-        line.insert(0, nodes[a]);
-        longer = true;
+    if *first != nodes[a] || *last != nodes[b] {
+        (*first, *last) = (nodes[a], nodes[b]);
+        attributes::smooth(line, false, width_mm);
     }
-    if last != nodes[b] {
-        line.push(nodes[b]);
-        longer = true;
-    }
-    if longer {
-        attributes::smooth(&mut line, false, width_mm);
-    }
-    line
 }
 
 fn nodes(points: &[MedialPoint], curves: &[Curve]) -> Vec<Node> {
@@ -384,9 +388,26 @@ fn nodes(points: &[MedialPoint], curves: &[Curve]) -> Vec<Node> {
             position: point.position,
             radius: point.radius,
             curves: at,
+            sheets: Vec::new(),
             persistence: 0.0,
         })
         .collect()
+}
+
+/// The sheets that have a facet at one of some vertices, ascending.
+fn sheets_at(fine: &FineScaffold, vertices: &[u32], sheet_of_facet: &[u32]) -> Vec<SheetId> {
+    let facets = vertices
+        .iter()
+        .flat_map(|&v| fine.edges_of_vertex(v as usize))
+        .flat_map(|e| fine.facets_of_edge(e as usize));
+    let mut sheets: Vec<SheetId> = facets
+        .map(|&f| sheet_of_facet[f as usize])
+        .filter(|&s| s != NONE)
+        .map(SheetId)
+        .collect();
+    sheets.sort_unstable();
+    sheets.dedup();
+    sheets
 }
 
 /// What meets at a node where the given curves end.
@@ -399,6 +420,8 @@ pub(crate) fn node_kind(at: &[CurveId], curves: &[Curve]) -> NodeKind {
         (4, 0, 0, 4) => NodeKind::A14,
         (1, _, 0, _) if rib >= 1 => NodeKind::A1A3,
         (0, 0, 1, 1) => NodeKind::Tip,
+        // Elsewhere two ribs alone are one.
+        (0, 2, 0, 2) => NodeKind::Corner,
         _ => NodeKind::Degenerate,
     }
 }

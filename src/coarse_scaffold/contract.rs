@@ -178,7 +178,20 @@ fn half_extent(fine: &FineScaffold, facets: &[u32]) -> f64 {
 
 /// Shrinks the candidates up to a cost, cheapest first.
 fn shrink(network: &mut Network, mut candidates: Vec<Candidate>, limit: f64) {
-    candidates.retain(|c| c.cost <= limit);
+    // Costs are held to the tolerance where they arise.
+    let local = |c: &Candidate| match network.regularised.cost {
+        Cost::Count => c.cost,
+        Cost::Length => {
+            let ends = c
+                .cells
+                .edges
+                .iter()
+                .flat_map(|&e| network.fine.edge_vertices[e as usize]);
+            let vertices: Vec<u32> = ends.collect();
+            network.regularised.persistence(c.cost, &vertices)
+        }
+    };
+    candidates.retain(|c| local(c) <= limit);
     candidates.sort_by(|a, b| a.cost.total_cmp(&b.cost).then(a.cells.edges.cmp(&b.cells.edges)));
     for candidate in candidates {
         let Candidate { kind, cost, cells } = candidate;
@@ -299,7 +312,7 @@ fn ball_covers(network: &Network, cells: &Cells) -> bool {
         .flat_map(|&e| fine.edge_generators[e as usize])
         .all(|g| {
             let distance = fine.generator_position[g.index()].distance(centre) - radius;
-            distance <= network.regularised.tolerance_mm
+            distance <= network.regularised.tolerance_at(v)
         })
 }
 

@@ -7,12 +7,13 @@ use super::hypergraph::{Curve, CurveKind};
 use crate::geometry::{CurveId, NodeId, SheetId};
 
 /// Joins the curves at nodes where just two of one kind and of the same sheets end, their fine edges with them, and numbers curves and
-/// nodes afresh. Returns the new number of each node, `None` for those that are gone.
+/// nodes afresh; a node that is a corner stays. Returns the new number of each node, `None` for those that are gone.
 pub(crate) fn dissolve(
     curves: &mut Vec<Curve>,
     edges: &mut Vec<Vec<u32>>,
-    nodes: usize,
+    is_corner: &[bool],
 ) -> Vec<Option<NodeId>> {
+    let nodes = is_corner.len();
     let ends = |curves: &[Curve]| {
         let mut any = vec![false; nodes];
         for n in curves.iter().flat_map(|c| &c.nodes) {
@@ -21,8 +22,10 @@ pub(crate) fn dissolve(
         any
     };
     let before = ends(curves);
-    join_curves(curves, edges, nodes, |a, b| {
-        matches!(a.kind, CurveKind::Rib | CurveKind::Axial) && sheets_of(a) == sheets_of(b)
+    join_curves(curves, edges, nodes, |node, a, b| {
+        !is_corner[node]
+            && matches!(a.kind, CurveKind::Rib | CurveKind::Axial)
+            && sheets_of(a) == sheets_of(b)
     });
     let after = ends(curves);
     let mut next = 0;
@@ -55,7 +58,7 @@ pub(crate) fn join_curves(
     curves: &mut Vec<Curve>,
     edges: &mut Vec<Vec<u32>>,
     nodes: usize,
-    may: impl Fn(&Curve, &Curve) -> bool,
+    may: impl Fn(usize, &Curve, &Curve) -> bool,
 ) {
     edges.resize(curves.len(), Vec::new());
     let mut at: Vec<Vec<usize>> = vec![Vec::new(); nodes];
@@ -68,7 +71,7 @@ pub(crate) fn join_curves(
     for n in 0..nodes {
         let &[a, b] = at[n].as_slice() else { continue };
         let node = NodeId::from_index(n);
-        if curves[a].kind != curves[b].kind || !may(&curves[a], &curves[b]) {
+        if curves[a].kind != curves[b].kind || !may(n, &curves[a], &curves[b]) {
             continue;
         }
         if a == b {
@@ -232,7 +235,7 @@ mod tests {
             rib([2, 0], 1, [3.0, 9.0]),
         ];
         let mut edges = vec![vec![11, 10], vec![12, 13], vec![14]];
-        let number = dissolve(&mut curves, &mut edges, 4);
+        let number = dissolve(&mut curves, &mut edges, &[false; 4]);
         assert_eq!(number, [Some(NodeId(0)), None, Some(NodeId(1)), Some(NodeId(2))]);
         assert_eq!(curves.len(), 2);
         assert_eq!(edges, [vec![10, 11, 12, 13], vec![14]]);
@@ -245,11 +248,20 @@ mod tests {
     }
 
     #[test]
+    fn ribs_stay_two_at_a_corner() {
+        let mut curves = vec![rib([1, 0], 0, [1.0, 0.0]), rib([1, 0], 0, [1.0, 3.0])];
+        let number = dissolve(&mut curves, &mut vec![vec![1], vec![2]], &[false, true]);
+        assert_eq!(number, [None, Some(NodeId(0))]);
+        assert_eq!((curves.len(), curves[0].closed), (1, true));
+        assert_eq!(curves[0].nodes, [NodeId(0), NodeId(0)]);
+    }
+
+    #[test]
     fn a_loop_through_its_only_node_is_a_closed_curve() {
         let mut curves = vec![rib([0, 0], 0, [0.0, 1.0])];
         let start = curves[0].polyline[0];
         curves[0].polyline.push(start);
-        let number = dissolve(&mut curves, &mut vec![vec![5, 6]], 1);
+        let number = dissolve(&mut curves, &mut vec![vec![5, 6]], &[false]);
         assert_eq!(number, [None]);
         assert!(curves[0].nodes.is_empty() && curves[0].closed);
         assert_eq!(curves[0].polyline.len(), 2);

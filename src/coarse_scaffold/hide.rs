@@ -6,7 +6,8 @@
 //! 1. the spines of the regularisation;
 //! 2. whiskers: wires with a free tip that hang on a sheet and are no longer than one and a half seams;
 //! 3. axial curves of less persistence than the cut, the least persistent first. The sheets along a curve that is hidden are one
-//!    sheet, and the curves on both sides of its ends become one where nothing else ends there, with the larger persistence.
+//!    sheet, and the curves on both sides of its ends become one where nothing else ends there, with the larger persistence;
+//! 4. flaps: the fin that such a curve carried, where it hangs on nothing else and all of it is below the cut.
 //!
 //! Cost `O(n)` for each curve hidden.
 
@@ -15,7 +16,9 @@ use super::hypergraph::CurveKind;
 use super::network::{Chain, Network};
 use super::settings::CoarseScaffoldSettings;
 use crate::fine_scaffold::complex::NONE;
+use crate::geometry::mesh::DisjointSets;
 use crate::regularise::{Event, Kind};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Hides whiskers and the axial curves below the cut.
 pub(crate) fn hide(network: &mut Network, settings: &CoarseScaffoldSettings) {
@@ -68,6 +71,67 @@ pub(crate) fn hide(network: &mut Network, settings: &CoarseScaffoldSettings) {
             .push(Event::applied(Kind::HideCurve, persistence * tau, place, 0, 0));
     }
     while drop_seams_of_crumbs(network) {}
+    hide_flaps(network);
+}
+
+/// Hides the flaps: pieces of sheet below the cut between a hidden curve and a rib, which shrink onto the curve.
+fn hide_flaps(network: &mut Network) {
+    let fine = network.fine;
+    let mut sets = DisjointSets::new(fine.num_facets());
+    for e in (0..fine.num_edges() as u32).filter(|&e| network.count(e) == 2) {
+        let pair: Vec<u32> = network.facets(e).collect();
+        sets.union(pair[0], pair[1]);
+    }
+    let mut pieces: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    let carries = |e: u32| network.hidden[e as usize] && network.count(e) > 2;
+    for e in (0..fine.num_edges() as u32).filter(|&e| carries(e)) {
+        for f in network.facets(e) {
+            pieces.entry(sets.find(f)).or_default();
+        }
+    }
+    for f in (0..fine.num_facets() as u32).filter(|&f| network.shows(f)) {
+        if let Some(piece) = pieces.get_mut(&sets.find(f)) {
+            piece.push(f);
+        }
+    }
+    for piece in pieces.into_values() {
+        if is_crumb(network, &piece) && is_flap(network, &piece) {
+            network.hide_facets(&piece);
+        }
+    }
+}
+
+/// Whether a piece of sheet is bounded by ribs and hidden curves alone and shrinks onto what it has in common with the rest: as many cells of
+/// it alone of even as of odd dimension, and a rib to start from.
+fn is_flap(network: &Network, piece: &[u32]) -> bool {
+    let fine = network.fine;
+    let own: BTreeSet<u32> = piece.iter().copied().collect();
+    let edges: BTreeSet<u32> = piece
+        .iter()
+        .flat_map(|&f| fine.facet_edges(f as usize).iter().copied())
+        .collect();
+    let alone = |e: u32| network.facets(e).all(|f| own.contains(&f));
+    let rib = |e: u32| network.count(e) == 1;
+    if !edges.iter().any(|&e| rib(e)) {
+        return false;
+    }
+    if edges.iter().any(|&e| !alone(e) && !network.hidden[e as usize]) {
+        return false;
+    }
+    let vertices: BTreeSet<u32> = piece
+        .iter()
+        .flat_map(|&f| fine.facet_vertices(f as usize).iter().copied())
+        .collect();
+    // Hidden wires that hang on it go with it.
+    let loose = |e: u32| network.hidden[e as usize] && network.count(e) == 0;
+    let alone_at = |v: u32| {
+        network
+            .alive_edges(v)
+            .all(|e| loose(e) || edges.contains(&e) && alone(e))
+    };
+    let own_vertices = vertices.iter().filter(|&&v| alone_at(v)).count();
+    let own_edges = edges.iter().filter(|&&e| alone(e)).count();
+    piece.len() + own_vertices == own_edges
 }
 
 /// Drops the first seam that cuts a crumb off a sheet: a piece of less persistence than the cut is none by itself. Returns whether

@@ -102,6 +102,8 @@ pub enum NodeKind {
     A14,
     /// The free end of a wire.
     Tip,
+    /// Two ribs of one sheet meet at a corner of the surface.
+    Corner,
     /// Any other meeting, made by a transform or by degenerate input.
     Degenerate,
 }
@@ -120,6 +122,9 @@ pub struct Node {
     pub radius: f64,
     /// Curves that end here; a loop is named twice.
     pub curves: Vec<CurveId>,
+    /// Sheets that reach the node, ascending; a wire may end in the middle of one.
+    #[serde(default)]
+    pub sheets: Vec<SheetId>,
     /// The largest persistence of its axial curves and wires, mm.
     pub persistence: f64,
 }
@@ -145,7 +150,9 @@ pub struct Curve {
     pub id: CurveId,
     /// Kind.
     pub kind: CurveKind,
-    /// How much of the shape must be given up before this curve goes, mm.
+    /// How much of the shape must be given up before this curve goes, mm. Where the tolerance is relative to the radius this is
+    /// in units of the local tolerance times `tolerance_mm`, so that a view cuts thick and thin parts alike. Never the
+    /// diagonal, unless nothing short of another topology takes the curve away.
     pub persistence: f64,
     /// End nodes: two (equal for a loop through a node), or none for a closed curve without nodes.
     pub nodes: Vec<NodeId>,

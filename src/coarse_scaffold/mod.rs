@@ -11,6 +11,7 @@
 mod attributes;
 pub mod build;
 mod contract;
+mod corners;
 mod dissolve;
 mod generators;
 mod hide;
@@ -21,6 +22,7 @@ mod network;
 pub mod ribs;
 pub mod settings;
 pub mod view;
+mod wires;
 
 pub use build::coarse_scaffold;
 pub use hypergraph::{

@@ -38,6 +38,10 @@ pub(crate) struct Network<'a> {
     pub(super) in_cluster: Vec<bool>,
     /// Curve edges that the graph does not show.
     pub(super) hidden: Vec<bool>,
+    /// Facets of flaps that the graph does not show.
+    hidden_facet: Vec<bool>,
+    /// Vertices where a rib is cut.
+    pub(super) corner: Vec<bool>,
     pub(super) cells: BTreeMap<u32, Cells>,
     /// Contractions that were done or refused.
     pub transforms: Vec<Event>,
@@ -62,6 +66,8 @@ impl<'a> Network<'a> {
             seam,
             contracted: vec![false; fine.num_edges()],
             hidden: vec![false; fine.num_edges()],
+            hidden_facet: vec![false; fine.num_facets()],
+            corner: vec![false; fine.num_vertices()],
             contracted_facet: vec![false; fine.num_facets()],
             cells: BTreeMap::new(),
             clusters: DisjointSets::new(fine.num_vertices()),
@@ -113,10 +119,32 @@ impl<'a> Network<'a> {
         chain.edges.iter().fold(chain.edges[0], highest)
     }
 
-    /// Alive facets at an edge.
+    /// Alive facets at an edge that are shown.
     pub fn facets(&self, e: u32) -> impl Iterator<Item = u32> + '_ {
-        let alive = |f: &u32| self.regularised.alive.facets[*f as usize];
-        self.fine.facets_of_edge(e as usize).iter().copied().filter(alive)
+        let shown = |f: &u32| self.shows(*f);
+        self.fine.facets_of_edge(e as usize).iter().copied().filter(shown)
+    }
+
+    /// Whether a facet is alive and shown.
+    pub fn shows(&self, f: u32) -> bool {
+        self.regularised.alive.facets[f as usize] && !self.hidden_facet[f as usize]
+    }
+
+    /// Alive facets at an edge that are shown, in number.
+    pub fn count(&self, e: u32) -> u8 {
+        self.count[e as usize]
+    }
+
+    /// Shows some facets no more, nor the edges that have no others.
+    pub fn hide_facets(&mut self, facets: &[u32]) {
+        for &f in facets {
+            self.hidden_facet[f as usize] = true;
+            for &e in self.fine.facet_edges(f as usize) {
+                self.count[e as usize] -= 1;
+                self.seam[e as usize] = false;
+                self.hidden[e as usize] |= self.count[e as usize] == 0;
+            }
+        }
     }
 
     /// Length of a path of edges, mm.
@@ -139,14 +167,18 @@ impl<'a> Network<'a> {
     }
 
     /// Whether a vertex is (part of) a node.
-    fn is_node(&self, v: u32) -> bool {
-        if self.in_cluster[v as usize] {
+    pub(super) fn is_node(&self, v: u32) -> bool {
+        if self.in_cluster[v as usize] || self.corner[v as usize] {
             return true;
         }
         let mut kinds = self.curve_edges(v).map(|e| self.kind(e));
         match (kinds.next(), kinds.next(), kinds.next()) {
             (None, ..) => self.fine.edges_of_vertex(v as usize).all(|e| !self.edge_alive(e)),
-            (Some(a), Some(b), None) => a != b,
+            // A wire that pierces a sheet is two wires.
+            (Some(a), Some(b), None) => {
+                a != b
+                    || a == Some(CurveKind::Wire) && self.alive_edges(v).any(|e| self.count[e as usize] > 0)
+            }
             _ => true,
         }
     }
@@ -217,8 +249,7 @@ impl<'a> Network<'a> {
     /// The sheets as lists of facets, in order of the smallest; facets inside nodes are in none.
     pub fn sheets(&self) -> Vec<Vec<u32>> {
         let fine = self.fine;
-        let in_sheet =
-            |f: u32| self.regularised.alive.facets[f as usize] && !self.contracted_facet[f as usize];
+        let in_sheet = |f: u32| self.shows(f) && !self.contracted_facet[f as usize];
         let mut sets = DisjointSets::new(fine.num_facets());
         for e in 0..fine.num_edges() as u32 {
             if self.edge_alive(e) && self.kind(e).is_none() && !self.contracted[e as usize] {

@@ -5,9 +5,10 @@
 //! distance `s` from the true rib (there the radius falls with slope one, and `s - (r(rib) - r)` is its second-order term), near
 //! a sharp edge linearly. So a power `ET^(1/p)` is linear in `s`, and its zero is the rib:
 //!
-//! 1. each rib is smoothed, ends kept;
-//! 2. around each of its points `ET^(1/p)` of the sheet's facets is fitted by a plane, for `p` of 1, 1.5 and 2; the
-//!    power that leaves the least residual over the whole rib is taken;
+//! 1. each rib is smoothed, ends kept, twice over so that bends do not shrink;
+//! 2. around each of its points `ET^(1/p)` of the sheet's facets is fitted by a linear function on the sheet's tangent plane, for `p` of 1, 1.5
+//!    and 2; the power that leaves the least residual over the whole rib is taken. (A linear function in space would do on a flat sheet only:
+//!    on a cone ET is exactly linear along the axis, and the rib would move along the axis, off the cone.)
 //! 3. the point moves outward along the sheet to the zero of the fit, by no more than a bound, and not at all where the rib ends at
 //!    an axial curve in the thick of the scaffold;
 //! 4. the moved curve is smoothed again; its radius follows the slope of the radius along the way;
@@ -16,20 +17,23 @@
 //!
 //! Cost: `O(rib points x neighbours)`.
 
-use super::attributes::smooth;
+use super::attributes::smooth_in_place;
 use super::hypergraph::{CurveKind, MedialPoint};
 use super::network::Chain;
 use crate::fine_scaffold::FineScaffold;
+use crate::geometry::neighbours::Neighbour;
 use crate::geometry::{LengthScale, Neighbours};
 use crate::regularise::Regularised;
 use glam::DVec3;
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rayon::prelude::*;
 
 /// Powers tried: sharp edges, and smooth ridges seen at finite sampling.
 const POWERS: [f64; 3] = [1.0, 1.5, 2.0];
 /// Facets looked at are within this many spacings of the rib point.
 const REACH: f64 = 5.0;
+/// Facets at least that are fitted.
+const FEWEST: usize = 8;
 /// Facets below this ET, in tolerances, say more of the sampling than of the shape.
 const LEAST: f64 = 0.1;
 
@@ -48,11 +52,15 @@ const FURTHEST: f64 = 2.0;
 struct Sample {
     position: DVec3,
     radius: f64,
+    /// Across the sheet: the direction between the facet's two generators.
+    across: DVec3,
     erosion: f64,
     area: f64,
+    tolerance: f64,
 }
 
-/// Smooths and fits the rib polylines of all chains; other chains are left as they are. `closed[i]` tells loops without nodes.
+/// Smooths and fits the rib polylines of all chains; other chains are left as they are. `free[i]` tells loops without nodes;
+/// `width` is the width of other curves' smoothing in tolerances.
 pub(crate) fn fit_ribs(
     fine: &FineScaffold,
     regularised: &Regularised,
@@ -61,19 +69,16 @@ pub(crate) fn fit_ribs(
     sheet_facets: &[Vec<u32>],
     polylines: &mut [Vec<MedialPoint>],
     free: &[bool],
-    width_mm: f64,
+    width: f64,
 ) {
-    let tau = regularised.tolerance_mm;
     let LengthScale { spacing_mm, .. } = fine.scale;
-    let reach = (REACH * spacing_mm).max(2.0 * tau);
-    let furthest = FURTHEST * tau;
     let samples: Vec<(Vec<Sample>, Neighbours)> = sheet_facets
         .par_iter()
         .map(|facets| {
             let own: Vec<Sample> = facets
                 .iter()
                 .map(|&f| sample(fine, regularised, f))
-                .filter(|s| s.erosion.is_finite() && s.erosion > LEAST * tau)
+                .filter(|s| s.erosion.is_finite() && s.erosion > LEAST * s.tolerance)
                 .collect();
             let tree = Neighbours::new(&own.iter().map(|s| s.position).collect::<Vec<_>>());
             (own, tree)
@@ -83,15 +88,30 @@ pub(crate) fn fit_ribs(
         let Some(sheet) = sheet_of_chain[i].filter(|_| chains[i].kind == CurveKind::Rib) else {
             return;
         };
-        let width_mm = RIB_WIDTH * width_mm;
-        smooth(line, free[i], width_mm);
+        let tau = regularised.tolerance_over(&chains[i].vertices);
+        let (reach, furthest) = ((REACH * spacing_mm).max(2.0 * tau), FURTHEST * tau);
+        let width_mm = RIB_WIDTH * width * tau;
+        smooth_in_place(line, free[i], width_mm);
         let fade = fade(line, &chains[i].vertices, free[i], regularised);
         let (own, tree) = &samples[sheet as usize];
+        let around: Vec<(Vec<Neighbour>, [DVec3; 2])> = line
+            .iter()
+            .map(|q| {
+                let near = tree.within(q.position, reach);
+                let tangents = tangents(own, &near);
+                (near, tangents)
+            })
+            .collect();
         let fits: Vec<Vec<Option<Fit>>> = POWERS
             .iter()
             .map(|&p| {
                 line.iter()
-                    .map(|q| fit(own, tree, q.position, reach, p))
+                    .zip(&around)
+                    .map(|(q, (near, tangents))| {
+                        (near.len() >= FEWEST)
+                            .then(|| fit(own, near, *tangents, q.position, reach, p))
+                            .flatten()
+                    })
                     .collect()
             })
             .collect();
@@ -105,7 +125,7 @@ pub(crate) fn fit_ribs(
                 q.radius = (q.radius + fade * f.radius_slope * f.to_zero.length().min(furthest)).max(0.0);
             }
         }
-        smooth(line, free[i], width_mm);
+        smooth_in_place(line, free[i], width_mm);
     });
 }
 
@@ -152,7 +172,12 @@ fn sample(fine: &FineScaffold, regularised: &Regularised, facet: u32) -> Sample 
             / n,
         radius: ring.iter().map(|&v| fine.vertex_radius[v as usize]).sum::<f64>() / n,
         erosion: regularised.erosion_mm[facet as usize],
+        across: {
+            let [a, b] = fine.facet_generators[facet as usize].map(|g| fine.generator_position[g.index()]);
+            (b - a).normalize_or_zero()
+        },
         area: super::attributes::facet_area(fine, facet),
+        tolerance: regularised.tolerance_over(ring),
     }
 }
 
@@ -166,25 +191,44 @@ struct Fit {
     residual: f64,
 }
 
-fn fit(samples: &[Sample], tree: &Neighbours, at: DVec3, reach: f64, power: f64) -> Option<Fit> {
-    let near = tree.within(at, reach);
-    if near.len() < 8 {
-        return None;
+/// The tangent plane of a sheet near a point: two directions across which none of the facets' generators lie, as far as that goes.
+fn tangents(samples: &[Sample], near: &[Neighbour]) -> [DVec3; 2] {
+    let mut across = Matrix3::<f64>::zeros();
+    for n in near {
+        let s = &samples[n.index as usize];
+        let v: Vector3<f64> = s.across.into();
+        across += v * v.transpose() * (s.area / (1e-12 + n.distance2).sqrt());
     }
+    let eigen = SymmetricEigen::new(across);
+    let mut order = [0, 1, 2];
+    order.sort_by(|&i, &j| eigen.eigenvalues[i].total_cmp(&eigen.eigenvalues[j]));
+    [order[0], order[1]].map(|k| {
+        let c = eigen.eigenvectors.column(k);
+        DVec3::new(c[0], c[1], c[2])
+    })
+}
+
+fn fit(
+    samples: &[Sample],
+    near: &[Neighbour],
+    tangents: [DVec3; 2],
+    at: DVec3,
+    reach: f64,
+    power: f64,
+) -> Option<Fit> {
     let value = |s: &Sample| s.erosion.powf(1.0 / power);
     let weight = |s: &Sample| {
         let x = s.position.distance(at) / reach;
         s.area * (1.0 - x * x).max(0.0)
     };
-    // Least squares of value and radius over 1, x, y, z; the sheet is thin across, so a little ridge keeps the
-    // slope in its plane.
-    let mut normal = Matrix4::<f64>::zeros();
-    let (mut by_value, mut by_radius) = (Vector4::<f64>::zeros(), Vector4::<f64>::zeros());
+    // Least squares of value and radius over 1 and the two directions of the plane.
+    let mut normal = Matrix3::<f64>::zeros();
+    let (mut by_value, mut by_radius) = (Vector3::<f64>::zeros(), Vector3::<f64>::zeros());
     let (mut sum, mut mean, mut square) = (0.0, 0.0, 0.0);
-    for n in &near {
+    for n in near {
         let s = &samples[n.index as usize];
         let d = (s.position - at) / reach;
-        let row = Vector4::new(1.0, d.x, d.y, d.z);
+        let row = Vector3::new(1.0, d.dot(tangents[0]), d.dot(tangents[1]));
         let w = weight(s);
         normal += row * row.transpose() * w;
         by_value += row * (w * value(s));
@@ -196,12 +240,14 @@ fn fit(samples: &[Sample], tree: &Neighbours, at: DVec3, reach: f64, power: f64)
     if sum <= 0.0 {
         return None;
     }
-    for k in 1..4 {
+    // A little ridge, for a sheet that is but a strip here.
+    for k in 1..3 {
         normal[(k, k)] += 1e-3 * sum;
     }
     let solve = normal.cholesky()?;
     let (a, b) = (solve.solve(&by_value), solve.solve(&by_radius));
-    let slope = DVec3::new(a[1], a[2], a[3]) / reach;
+    let in_space = |x: &Vector3<f64>| (x[1] * tangents[0] + x[2] * tangents[1]) / reach;
+    let slope = in_space(&a);
     let steep = slope.length_squared();
     let spread = (square - mean * mean / sum).max(f64::MIN_POSITIVE);
     // The point must lie on the side where the values fall, and the fall must be more than noise.
@@ -209,11 +255,10 @@ fn fit(samples: &[Sample], tree: &Neighbours, at: DVec3, reach: f64, power: f64)
         return None;
     }
     let to_zero = -slope * (a[0] / steep);
-    let radius = DVec3::new(b[1], b[2], b[3]) / reach;
     let explained = a.dot(&by_value);
     Some(Fit {
         to_zero,
-        radius_slope: radius.dot(to_zero.normalize_or_zero()).clamp(-1.0, 0.0),
+        radius_slope: in_space(&b).dot(to_zero.normalize_or_zero()).clamp(-1.0, 0.0),
         residual: ((square - explained) / spread).max(0.0),
     })
 }

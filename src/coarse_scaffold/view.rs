@@ -3,7 +3,8 @@
 //! In: a coarse scaffold. Out: the graph of what is at least as persistent as the tolerance: nothing is burnt or collapsed
 //! again, so views are cheap, and nested: what a coarse view shows, every finer one shows too.
 //!
-//! 1. sheets below the tolerance go; of a part of the scaffold that would vanish, the most persistent sheet stays;
+//! 1. sheets below the tolerance go; of a part of the scaffold that would vanish, the most persistent sheet (or wire) stays; what hangs on
+//!    wires that go goes with them;
 //! 2. axial curves, wires and seams below it go; of the three sheets at an axial curve that went, the two of highest erosion thickness become
 //!    one and the third is one with them only where nothing else holds it; what a sheet that went stood for (volume, generators)
 //!    falls to the sheet it hung on by its most persistent curve;
@@ -16,12 +17,13 @@
 use super::attributes::{boundaries, principal};
 use super::build::{node_kind, node_persistence};
 use super::dissolve::{join_curves, join_facing};
-use super::hypergraph::{CoarseScaffold, Curve, CurveKind, FineLinks, Node, Sheet};
+use super::hypergraph::{CoarseScaffold, Curve, CurveKind, FineLinks, Node, NodeKind, Sheet};
 use super::natural::natural_tolerances;
 use crate::geometry::mesh::DisjointSets;
 use crate::geometry::{CurveId, NodeId, SheetId};
 use glam::DVec3;
 use nalgebra::{Matrix3, Vector3};
+use std::collections::{BTreeMap, BTreeSet};
 
 impl CoarseScaffold {
     /// The graph at a tolerance no finer than its own; see [the module](super::view). A finer tolerance returns it unchanged.
@@ -29,15 +31,7 @@ impl CoarseScaffold {
         if tolerance_mm <= self.tolerance_mm {
             return self.clone();
         }
-        let keep_sheet = self.sheets_kept(tolerance_mm);
-        let keep_curve: Vec<bool> = self
-            .curves
-            .iter()
-            .map(|c| match c.kind {
-                CurveKind::Rib => c.sheets.iter().all(|s| keep_sheet[s.index()]),
-                _ => c.persistence >= tolerance_mm,
-            })
-            .collect();
+        let (keep_sheet, keep_curve) = self.kept(tolerance_mm);
         let mut merged = self.joined(&keep_sheet, &keep_curve);
         let (mut sheets, sheet_of) = self.merged_sheets(&keep_sheet, &mut merged);
         let mut curves: Vec<Curve> = self
@@ -56,10 +50,20 @@ impl CoarseScaffold {
             })
             .collect();
         join_facing(&mut curves, self.nodes.len());
-        join_curves(&mut curves, &mut Vec::new(), self.nodes.len(), |a, b| {
-            a.kind != CurveKind::Rib || a.sheets == b.sheets
+        join_curves(&mut curves, &mut Vec::new(), self.nodes.len(), |node, a, b| {
+            self.nodes[node].kind != NodeKind::Corner && (a.kind != CurveKind::Rib || a.sheets == b.sheets)
         });
-        let nodes = renumber(&mut curves, &self.nodes, &self.curves, sheets.is_empty());
+        let mut nodes = renumber(&mut curves, &self.nodes, &self.curves, sheets.is_empty());
+        for node in &mut nodes {
+            node.sheets = node
+                .sheets
+                .iter()
+                .filter_map(|s| sheet_of[s.index()])
+                .map(SheetId)
+                .collect();
+            node.sheets.sort_unstable();
+            node.sheets.dedup();
+        }
         boundaries(&mut sheets, &curves);
         CoarseScaffold {
             tolerance_mm,
@@ -113,31 +117,104 @@ impl CoarseScaffold {
         merged
     }
 
-    /// Sheets that stay: those persistent enough, and the most persistent one of each part without any.
-    fn sheets_kept(&self, tolerance_mm: f64) -> Vec<bool> {
-        let mut keep: Vec<bool> = self
+    /// Sheets and curves that stay: what is persistent enough; the most persistent sheet of each part without any, unless the part
+    /// hangs on wires that end in one node of it or go, so that the node can stand for it; and of a component without anything its most
+    /// persistent sheet or wire. Ribs stay with their sheets.
+    fn kept(&self, tolerance_mm: f64) -> (Vec<bool>, Vec<bool>) {
+        let mut sheet: Vec<bool> = self
             .sheets
             .iter()
             .map(|s| s.persistence >= tolerance_mm)
             .collect();
+        let mut curve: Vec<bool> = self
+            .curves
+            .iter()
+            .map(|c| c.persistence >= tolerance_mm)
+            .collect();
+        self.keep_of_components(&mut sheet, &mut curve);
+        self.keep_of_parts(&mut sheet, &curve);
+        for (keep, c) in curve.iter_mut().zip(&self.curves) {
+            if c.kind == CurveKind::Rib {
+                *keep = c.sheets.iter().all(|s| sheet[s.index()]);
+            }
+        }
+        (sheet, curve)
+    }
+
+    /// The most persistent sheet or wire of each component that would vanish stays; of equals the first, sheets before wires.
+    fn keep_of_components(&self, sheet: &mut [bool], curve: &mut [bool]) {
+        let mut sets = self.components();
+        let sheets = self.sheets.len();
+        // Of each component its best so far: persistence, and id as in the sets.
+        let mut best: BTreeMap<u32, (f64, usize)> = BTreeMap::new();
+        let wires = self.curves.iter().filter(|c| c.kind == CurveKind::Wire);
+        let all = self.sheets.iter().map(|s| (s.id.index(), s.persistence));
+        for (i, persistence) in all.chain(wires.map(|c| (sheets + c.id.index(), c.persistence))) {
+            let slot = best.entry(sets.find(i as u32)).or_insert((persistence, i));
+            if slot.0 < persistence {
+                *slot = (persistence, i);
+            }
+        }
+        for (_, i) in best.into_values() {
+            match i.checked_sub(sheets) {
+                None => sheet[i] = true,
+                Some(c) => curve[c] = true,
+            }
+        }
+    }
+
+    /// The most persistent sheet of each part stays where nothing else can stand for the part.
+    fn keep_of_parts(&self, sheet: &mut [bool], curve: &[bool]) {
         let mut parts = DisjointSets::new(self.sheets.len());
         for c in &self.curves {
             for pair in c.sheets.windows(2) {
                 parts.union(pair[0].0, pair[1].0);
             }
         }
-        let mut best: Vec<Option<u32>> = vec![None; self.sheets.len()];
-        for s in 0..self.sheets.len() as u32 {
-            let slot = &mut best[parts.find(s) as usize];
-            if slot.is_none_or(|b| self.sheets[b as usize].persistence < self.sheets[s as usize].persistence)
-            {
-                *slot = Some(s);
+        let mut best: BTreeMap<u32, usize> = BTreeMap::new();
+        for s in 0..self.sheets.len() {
+            let slot = best.entry(parts.find(s as u32)).or_insert(s);
+            if self.sheets[*slot].persistence < self.sheets[s].persistence {
+                *slot = s;
             }
         }
-        for s in best.into_iter().flatten() {
-            keep[s as usize] = true;
+        let mut has_wires: BTreeSet<u32> = BTreeSet::new();
+        let mut held: BTreeSet<(u32, NodeId)> = BTreeSet::new();
+        for c in self.curves.iter().filter(|c| c.kind == CurveKind::Wire) {
+            for &n in &c.nodes {
+                for s in &self.nodes[n.index()].sheets {
+                    let part = parts.find(s.0);
+                    has_wires.insert(part);
+                    if curve[c.id.index()] {
+                        held.insert((part, n));
+                    }
+                }
+            }
         }
-        keep
+        for (part, s) in best {
+            let nodes = held.range((part, NodeId(0))..=(part, NodeId(u32::MAX))).count();
+            sheet[s] |= !has_wires.contains(&part) || nodes > 1;
+        }
+    }
+
+    /// What hangs together: sheets by their ids, then curves by theirs.
+    fn components(&self) -> DisjointSets {
+        let sheets = self.sheets.len();
+        let mut sets = DisjointSets::new(sheets + self.curves.len());
+        let curve = |c: CurveId| (sheets + c.index()) as u32;
+        for c in &self.curves {
+            for s in &c.sheets {
+                sets.union(curve(c.id), s.0);
+            }
+        }
+        for n in &self.nodes {
+            let curves = n.curves.iter().map(|&c| curve(c));
+            let own: Vec<u32> = curves.chain(n.sheets.iter().map(|s| s.0)).collect();
+            for pair in own.windows(2) {
+                sets.union(pair[0], pair[1]);
+            }
+        }
+        sets
     }
 
     /// One sheet for each merged set that holds a kept one, and the new number of every sheet that is still there.

@@ -171,7 +171,7 @@ fn across(triangulation: &Triangulation, domain: &Domain, facet: Facet, opposite
 }
 
 /// Betti numbers of the solid bounded by a closed, oriented mesh without self-intersections: outward components bound pieces,
-/// inward ones bound cavities. `None` when the mesh is open, not consistently oriented, or pinched.
+/// inward ones bound cavities, and those that enclose nothing count for nothing. `None` when the mesh is open, not consistently oriented, or pinched.
 pub fn mesh_betti(mesh: &TriangleMesh) -> Option<Betti> {
     let topology = mesh.topology();
     if !topology.watertight
@@ -182,13 +182,16 @@ pub fn mesh_betti(mesh: &TriangleMesh) -> Option<Betti> {
         return None;
     }
     let mut betti = Betti::default();
-    for part in mesh.components() {
-        if mesh.submesh(&part).signed_volume() > 0.0 {
+    let mut euler = 0;
+    for part in mesh.solid_components() {
+        let part = mesh.submesh(&part);
+        euler += part.topology().euler;
+        if part.signed_volume() > 0.0 {
             betti.b0 += 1;
         } else {
             betti.b2 += 1;
         }
     }
-    betti.b1 = betti.b0 + betti.b2 - topology.euler / 2;
+    betti.b1 = betti.b0 + betti.b2 - euler / 2;
     Some(betti)
 }

@@ -105,6 +105,21 @@ impl TriangleMesh {
         topology(&self.triangles, self.points.len())
     }
 
+    /// The components that enclose some volume, as [`Self::components`]: not the pairs of triangles back to back, or the needles, that files
+    /// hold beside the surface. `O(n log n)`.
+    pub fn solid_components(&self) -> Vec<Vec<u32>> {
+        /// A ball encloses 0.09 of its area to the power of 1.5, and a plate of a thousandth of its width 0.0004.
+        const NOTHING: f64 = 1e-9;
+        let mut parts = self.components();
+        if parts.len() > 1 {
+            parts.retain(|part| {
+                let part = self.submesh(part);
+                part.signed_volume().abs() > NOTHING * part.area().powf(1.5)
+            });
+        }
+        parts
+    }
+
     /// Connected components as lists of triangle indices, in order of their smallest triangle.
     pub fn components(&self) -> Vec<Vec<u32>> {
         let mut sets = DisjointSets::new(self.points.len());

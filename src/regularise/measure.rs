@@ -42,7 +42,10 @@ impl Tolerance {
             _ => Vec::new(),
         };
         let inside = at_vertex_mm.iter().zip(&fine.vertex_outside);
-        let largest = inside.filter(|(_, outside)| !**outside).map(|(t, _)| *t).fold(0.0, f64::max);
+        let largest = inside
+            .filter(|(_, outside)| !**outside)
+            .map(|(t, _)| *t)
+            .fold(0.0, f64::max);
         Self {
             everywhere_mm: if at_vertex_mm.is_empty() {
                 length.to_mm(fine.scale, 0.0)

@@ -24,7 +24,9 @@ const APART: f64 = 0.5;
 pub(crate) fn part_radii(fine: &FineScaffold) -> Vec<f64> {
     let n = fine.num_vertices();
     let mut part = fine.vertex_radius.clone();
-    let mut order: Vec<u32> = (0..n as u32).filter(|&v| !fine.vertex_outside[v as usize]).collect();
+    let mut order: Vec<u32> = (0..n as u32)
+        .filter(|&v| !fine.vertex_outside[v as usize])
+        .collect();
     order.sort_by(|&a, &b| {
         let r = |v: u32| fine.vertex_radius[v as usize];
         r(b).total_cmp(&r(a)).then(a.cmp(&b))

@@ -137,7 +137,7 @@ impl Ways {
                     continue;
                 }
                 let next = way + fine.vertex_position[v as usize].distance(fine.vertex_position[to]);
-                if next < out.length[to] && next <= longest * measure.tolerance.at(fine.vertex_radius[to]) {
+                if next < out.length[to] && next <= longest * measure.tolerance.at(to as u32) {
                     out.length[to] = next;
                     out.edge[to] = e;
                     queue.push(next, to as u32);

@@ -53,6 +53,8 @@ pub struct Regularised {
     pub fidelity: Fidelity,
     /// The tolerance, mm; with a tolerance relative to the radius, that of the thickest part.
     pub tolerance_mm: f64,
+    /// Diagonal of the bounding box of the generators, mm.
+    pub diagonal_mm: f64,
     /// What was cheapest first.
     pub cost: Cost,
     /// The cut, in local tolerances: what is less persistent has been removed, unless the surface would have moved too far. 0
@@ -69,6 +71,21 @@ impl Regularised {
         self.local_tolerance.at(vertex)
     }
 
+    /// A number of local tolerances as a persistence, mm: of the tolerance itself, so that elements of thick and thin parts are graded alike;
+    /// below the diagonal, which stands for what cannot go at any price.
+    pub(crate) fn at_scale(&self, tolerances: f64) -> f64 {
+        (tolerances * self.tolerance_mm).min(BELOW * self.diagonal_mm)
+    }
+
+    /// A length at some vertices as a persistence, mm: see [`Self::at_scale`]. Infinite (no fire comes) is the diagonal.
+    pub(crate) fn persistence(&self, length_mm: f64, vertices: &[u32]) -> f64 {
+        if length_mm.is_infinite() {
+            return self.diagonal_mm;
+        }
+        let share = self.tolerance_mm / self.local_tolerance.over(vertices);
+        (length_mm * share).min(BELOW * self.diagonal_mm)
+    }
+
     /// The mean tolerance over some vertices, mm.
     pub(crate) fn tolerance_over(&self, vertices: &[u32]) -> f64 {
         self.local_tolerance.over(vertices)
@@ -79,6 +96,9 @@ impl Regularised {
         self.betti.last().map(|s| s.betti).unwrap_or_default()
     }
 }
+
+/// What can go at some price has a persistence of less than this share of the diagonal.
+const BELOW: f64 = 0.999;
 
 /// Times that growing back is tried anew with the offending pieces restored, before everything that offends without
 /// growing back is restored, which always succeeds.
@@ -349,6 +369,7 @@ impl<'a> Run<'a> {
             betti: self.betti,
             fidelity,
             tolerance_mm,
+            diagonal_mm: self.fine.scale.diagonal_mm,
             cost: self.settings.cost,
             cut: match self.settings.cost {
                 Cost::Length => self.cut,

@@ -102,8 +102,8 @@ pub fn box_shape(x: f64, y: f64, z: f64) -> Shape {
 ///
 /// With the half thickness `h` the ball at the end of the middle sheet leaves `(sqrt 2 - 1) h = 0.41 h` of an edge uncovered, which is
 /// also the erosion thickness of the sheet at that edge (fire comes from the edge over `sqrt 2 h` to where the radius is `h`), and
-/// `(sqrt 3 - 1) h = 0.73 h` of a corner. So a scaffold that may change the shape by `tau` has one sheet with one rib for certain where
-/// `0.73 h <= tau`, and all 13 sheets of a box for certain where `0.41 h > tau`. In between a method may keep the edges or not. The diagonal is
+/// `(sqrt 3 - 1) h = 0.73 h` of a corner. So a scaffold that may change the shape by `tau` has one sheet for certain, its border cut into four
+/// ribs by the corners, where `0.73 h <= tau`, and all 13 sheets of a box for certain where `0.41 h > tau`. In between a method may keep the edges or not. The diagonal is
 /// `48.9 h`: 1.5 % of it are `0.73 h` and must give one sheet, 0.5 % are `0.24 h` and must give 13; 1 % are `0.49 h`, where the
 /// sheets at the edges stand for 0.85 tolerances and the corners for 1.5.
 pub fn slab(thickness: f64) -> Shape {
