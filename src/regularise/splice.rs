@@ -244,7 +244,7 @@ impl Splicer<'_> {
             return (generators.len() < threshold as usize).then_some(generators.len() as f64);
         }
         let area: f64 = facets.iter().map(|&f| self.measure.facet_area[f as usize]).sum();
-        let tau = self.measure.tolerance.of_facets(fine, &facets);
+        let tau = self.measure.tolerance.of_facets(fine, facets);
         let largest = facets
             .iter()
             .map(|&f| self.relative[f as usize])
