@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! cargo run --release --example segregation_table -- --n 10000 --seeds 3 --noise 0,0.05,0.1,0.25,0.5,0.75
-//!     [--shapes torus,bunny] [--density 20] [--outliers 0.05] [--verbose] [--rows] [--no-second] [--closed] [--time]
+//!     [--shapes torus,bunny] [--density 20] [--outliers 0.05] [--verbose] [--rows] [--no-second] [--no-retry] [--closed] [--time]
 //! cargo run --release --example segregation_table -- --n 10000 --all-meshes [--verbose]
 //! cargo run --release --example segregation_table -- --n 4000 --seeds 2 --holes 0,0.04,0.06,0.1 [--noise 0,0.1]
 //! ```
@@ -15,7 +15,9 @@
 mod support;
 
 use medial_scaffold::geometry::TriangleMesh;
-use medial_scaffold::segregation::{ClosedOrOpen, CloudSegregation, SegregationSettings, segregate_cloud};
+use medial_scaffold::segregation::{
+    ClosedOrOpen, CloudSegregation, Denoise, SegregationSettings, segregate_cloud,
+};
 use std::time::Instant;
 use support::{all_shapes, corrupted};
 
@@ -143,6 +145,9 @@ fn parse() -> Options {
     let mut settings = SegregationSettings::default();
     if args.iter().any(|a| a == "--no-second") {
         settings.second_opinion_noise = f64::INFINITY;
+    }
+    if args.iter().any(|a| a == "--no-retry") {
+        settings.denoise = Denoise::Always;
     }
     if args.iter().any(|a| a == "--closed") {
         settings.closed = ClosedOrOpen::Closed;

@@ -24,7 +24,7 @@ use super::judge::{Judged, sorted};
 use super::labels::Segregation;
 use super::openness::{patches, rims};
 use super::orient::orient;
-use super::prepare::{Prepared, Strength, clean, thin_out};
+use super::prepare::{Measured, Prepared, Strength, clean, measure, thin_out};
 use super::report::{ClosingReport, CloudReport, ComponentReport, Variation};
 use super::runs::{Chosen, Run, choose, opinion_of, run};
 use super::self_check::{doubts, pull_opinions, self_check};
@@ -78,13 +78,20 @@ pub fn segregate_cloud(
     settings: &SegregationSettings,
 ) -> Result<CloudSegregation, SegregationError> {
     check(points)?;
-    let first = segregate_cleaned(points, Strength::Measured, settings)?;
+    let measured = measure(points, settings.denoise);
+    // A copy for the second try, if there may be one.
+    let again = (settings.denoise == Denoise::Auto).then(|| measured.clone());
+    let first = segregate_measured(points, measured, Strength::Measured, settings)?;
     if settings.denoise != Denoise::Auto || !first.report.doubtful() {
         return Ok(first);
     }
     for &strength in gentler(&first.report, settings) {
         // Another strength may have fewer components than the one asked for; it is then no better.
-        let Ok(mut other) = segregate_cleaned(points, strength, settings) else {
+        let measured = match (strength, &again) {
+            (Strength::Nothing, _) | (_, None) => measure(points, Denoise::Off),
+            (_, Some(measured)) => measured.clone(),
+        };
+        let Ok(mut other) = segregate_measured(points, measured, strength, settings) else {
             continue;
         };
         if !other.report.doubtful() {
@@ -116,12 +123,13 @@ fn gentler(report: &CloudReport, settings: &SegregationSettings) -> &'static [St
     }
 }
 
-fn segregate_cleaned(
+fn segregate_measured(
     points: &[DVec3],
+    measured: Measured,
     strength: Strength,
     settings: &SegregationSettings,
 ) -> Result<CloudSegregation, SegregationError> {
-    let cleaned = clean(points, settings, strength);
+    let cleaned = clean(measured, strength);
     let chosen = choose(&cleaned, settings)?;
     finish(points, chosen, &BTreeSet::new(), settings)
 }
@@ -139,7 +147,7 @@ pub(super) fn segregate_with_preset(
     triangles: &[[u32; 3]],
     settings: &SegregationSettings,
 ) -> Result<PresetOutcome, SegregationError> {
-    let cleaned = clean(points, settings, Strength::Measured);
+    let cleaned = clean(measure(points, settings.denoise), Strength::Measured);
     let prepared = thin_out(&cleaned, settings.seed);
     let mut place = vec![u32::MAX; points.len()];
     for (new, &old) in prepared.source.iter().enumerate() {

@@ -3,7 +3,8 @@
 //! In: a cleaned cloud. Out: [`Chosen`]: one thinned cloud with its closure, and what the others said.
 //!
 //! 1. A run: thin, close, once more without the points left off, narrow handles given up.
-//! 2. With strong noise a second thinning seed is tried, unless the first run has next to no *strain* ([`Run::strain`]), and a third
+//! 2. With strong noise a second thinning seed is tried, unless the first run has next to no *strain* ([`Run::strain`]; wide handles are
+//!    none unless the noise is very strong), and a third
 //!    when the two disagree on the topology or one has a fault that would be doubted. The least strain wins: parts, handles, area without support and
 //!    points off the surface are what noise makes, so the run that needs least of them explains the cloud best. (A majority
 //!    takes the commonest mistake: where an ear is thinner than the noise most seeds are wrong.)
@@ -21,7 +22,7 @@ use super::judge::Judged;
 use super::labels::boundary_triangles;
 use super::prepare::{Cleaned, Prepared, thin_out};
 use super::report::{SecondOpinion, Variation};
-use super::self_check::{DOUBTFUL_OFF, PULL_FACTORS};
+use super::self_check::{BLURRED, DOUBTFUL_OFF, PULL_FACTORS};
 use super::settings::{ClosedOrOpen, Denoise, SegregationSettings};
 use crate::geometry::TriangleMesh;
 use std::collections::BTreeSet;
@@ -48,6 +49,8 @@ pub(super) struct Chosen {
 struct Strain {
     components: usize,
     euler: i64,
+    /// Handles of all components.
+    handles: f64,
     /// Unsupported area over the share from which the surface is open.
     unsupported: f64,
     /// Points off the surface over the share that is doubted.
@@ -70,6 +73,7 @@ impl Run {
         Strain {
             components: topology.components,
             euler: topology.euler,
+            handles,
             unsupported,
             off,
             narrow: self.closure.handles.iter().any(|h| h.rings < LONGEST_LOOP / 2),
@@ -175,7 +179,8 @@ pub(super) fn choose(cleaned: &Cleaned, settings: &SegregationSettings) -> Resul
     }
     let mut strains = vec![first.strain(settings)];
     let mut runs = vec![first];
-    while runs.len() < 3 && !settled(&strains) {
+    let blurred = cleaned.noise_over_spacing() >= BLURRED;
+    while runs.len() < 3 && !settled(&strains, blurred) {
         let seed = settings.seed.wrapping_add(runs.len() as u64);
         let next = run(thin_out(cleaned, seed), &[], seed, settings)?;
         strains.push(next.strain(settings));
@@ -201,9 +206,17 @@ pub(super) fn choose(cleaned: &Cleaned, settings: &SegregationSettings) -> Resul
 }
 
 /// Whether no further seed is needed.
-fn settled(strains: &[Strain]) -> bool {
+fn settled(strains: &[Strain], blurred: bool) -> bool {
     match strains {
-        [first] => first.total < NO_STRAIN,
+        [first] => {
+            // Handles that are wide are no work of noise, unless it is wider than they are.
+            let handles = if first.narrow || blurred {
+                first.handles
+            } else {
+                0.0
+            };
+            first.total - first.handles + handles < NO_STRAIN
+        }
         [first, second] => {
             (first.euler, first.components) == (second.euler, second.components)
                 && strains

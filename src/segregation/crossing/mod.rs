@@ -47,6 +47,8 @@ const FARTHEST: f64 = 16.0;
 /// Noise over spacing from which the smoothed points are looked at instead of those measured: planes of few points are too
 /// uncertain then.
 const STRONG_NOISE: f64 = 0.15;
+/// Noise over spacing from which no crossings are looked for: what is left of it folds into sheets that are none.
+const TOO_NOISY: f64 = 0.35;
 /// Shortest line believed then, spacings: folds that strong noise leaves are up to ten long.
 const LONG: f64 = 15.0;
 /// What smoothing leaves of strong noise.
@@ -118,6 +120,9 @@ pub struct OpenSurface<'a> {
 /// # Errors
 /// When the changed points cannot be triangulated.
 pub fn join_crossings(surface: &OpenSurface) -> Result<Option<Joined>, DelaunayError> {
+    if surface.noise_over_spacing >= TOO_NOISY {
+        return Ok(None);
+    }
     let strong = surface.noise_over_spacing >= STRONG_NOISE;
     let (measured, noise) = match strong {
         true => (surface.points, LEFT),

@@ -21,7 +21,7 @@ pub mod outliers;
 pub mod smooth;
 pub mod thin;
 
-use super::settings::{Denoise, SegregationSettings};
+use super::settings::Denoise;
 use glam::DVec3;
 use knn::KnnLists;
 use serde::{Deserialize, Serialize};
@@ -105,16 +105,21 @@ impl Cleaned {
     }
 }
 
-/// Steps 1 to 3. Points must be finite (checked at the door of the cloud route).
-pub fn clean(points: &[DVec3], settings: &SegregationSettings, strength: Strength) -> Cleaned {
-    let denoise = match strength {
-        Strength::Nothing => Denoise::Off,
-        _ => settings.denoise,
-    };
+/// A cloud without its outliers and with its noise measured, from which every strength of smoothing starts.
+#[derive(Clone, Debug)]
+pub struct Measured {
+    points: Vec<DVec3>,
+    source: Vec<u32>,
+    lists: KnnLists,
+    denoise: Denoise,
+    report: PrepareReport,
+}
+
+/// Steps 1 and 2. Points must be finite (checked at the door of the cloud route).
+pub fn measure(points: &[DVec3], denoise: Denoise) -> Measured {
     let distinct = distinct_sorted(points);
     let mut report = PrepareReport {
         points: points.len(),
-        strength,
         duplicates: points.len() - distinct.points.len(),
         ..Default::default()
     };
@@ -131,11 +136,30 @@ pub fn clean(points: &[DVec3], settings: &SegregationSettings, strength: Strengt
     let level = noise::estimate(&points, &lists);
     report.noise_over_spacing = level.noise_over_spacing;
     report.spacing_mm = level.spacing_mm;
+    Measured {
+        points,
+        source,
+        lists,
+        denoise,
+        report,
+    }
+}
+
+/// Step 3; `strength` says how much of it. [`Strength::Nothing`] is for clouds measured with [`Denoise::Off`].
+pub fn clean(measured: Measured, strength: Strength) -> Cleaned {
+    let Measured {
+        mut points,
+        source,
+        mut lists,
+        denoise,
+        mut report,
+    } = measured;
+    report.strength = strength;
     let mut moves = vec![0.0; points.len()];
     let mut plan = match denoise {
         Denoise::Off => None,
-        Denoise::Auto => noise::plan(level.noise_over_spacing),
-        Denoise::Always => noise::plan(level.noise_over_spacing.max(noise::THRESHOLD)),
+        Denoise::Auto => noise::plan(report.noise_over_spacing),
+        Denoise::Always => noise::plan(report.noise_over_spacing.max(noise::THRESHOLD)),
     };
     if strength == Strength::Light {
         plan = plan.map(noise::SmoothingPlan::light);

@@ -45,7 +45,8 @@ pub fn smooth(points: &mut Vec<DVec3>, lists: &mut KnnLists, plan: &SmoothingPla
         .map(|i| kernel(points, lists, i, plan))
         .collect();
     for pass in 0..plan.passes {
-        if pass > 0 || lists.k() < plan.neighbours {
+        // The first pass takes most of the noise off; after it neighbours hardly change any more.
+        if pass == 1 {
             *lists = KnnLists::new(points, plan.neighbours);
         }
         let moved: Vec<DVec3> = (0..points.len())
