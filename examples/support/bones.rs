@@ -71,6 +71,9 @@ pub fn table(n: usize, words: &[String]) -> Result<(), Box<dyn Error>> {
             line(name, n, second, settings, &files)?;
         }
     }
+    if wanted("all pairs") {
+        all_pairs(n, &length)?;
+    }
     if wanted("mirrored") {
         mirrored(n, &length)?;
     }
@@ -112,6 +115,24 @@ fn line(
         }
     }
     agreement.print(name);
+    Ok(())
+}
+
+/// All pairs of six samplings of each bone: what single pairs scatter about.
+fn all_pairs(n: usize, settings: &RegulariseSettings) -> Result<(), Box<dyn Error>> {
+    let mut agreement = Agreement::default();
+    for file in bones() {
+        let mesh = read_mesh(&file)?;
+        let runs = (1..=6)
+            .map(|seed| run(&sample(&mesh, n, seed), &mesh, settings))
+            .collect::<Result<Vec<Run>, _>>()?;
+        for (i, a) in runs.iter().enumerate() {
+            for b in &runs[i + 1..] {
+                agreement.add(a, b);
+            }
+        }
+    }
+    agreement.print("all pairs of six samplings");
     Ok(())
 }
 

@@ -6,11 +6,12 @@ use medial_scaffold::geometry::closest::ClosestOnMesh;
 use medial_scaffold::geometry::{Neighbours, TriangleMesh};
 
 /// Heading of the lines that [`Agreement::print`] writes.
-pub const HEADING: &str = "| variant | shapes | sheets change | axial change | the same over views of 1 to 2.5 tolerances | curves re-found | persistence change | same axial / all counts at the gap of the first | at the gap of both | the same up to 2.5 tolerances | medial distance %D | fidelity median / max (tau) | Betti = surface's |
+pub const HEADING: &str = "| variant | shapes | sheets change | axial change | the same over views of 1 to 2.5 tolerances | curves re-found | persistence change | same axial / all counts at the gap of the first | at the gap of both | the same up to 3 tolerances | medial distance %D | fidelity median / max (tau) | Betti = surface's |
 |---|---|---|---|---|---|---|---|---|---|---|---|---|";
 
 /// A gap is looked for up to this many tolerances.
 pub const NEAR: f64 = 1.8;
+const FAR: f64 = 3.0;
 
 /// Views that counts are compared over, in tolerances.
 const VIEWS: [f64; 9] = [1.0, 1.12, 1.26, 1.41, 1.58, 1.78, 2.0, 2.24, 2.5];
@@ -71,11 +72,7 @@ impl Agreement {
             }
         }
         let both = [&a.coarse, &b.coarse];
-        let gaps = [
-            gap_of(&both[..1], NEAR),
-            gap_of(&both, NEAR),
-            gap_of(&both, VIEWS[8]),
-        ];
+        let gaps = [gap_of(&both[..1], NEAR), gap_of(&both, NEAR), gap_of(&both, FAR)];
         for (gap, same) in gaps.into_iter().zip(&mut self.same) {
             let [x, y] = [&a.coarse, &b.coarse].map(|s| counts(&s.view(gap)));
             same[0] += usize::from(x[0] == y[0]);
