@@ -261,6 +261,22 @@ fn joint(title: &str, targets: &[Bone], sources: &[Bone]) {
         let of_source = (0..b.len())
             .filter(|&j| least((0..a.len()).map(|i| cost(i, j)).collect()).is_some_and(|i| same(i, j)))
             .count();
+        for i in 0..a.len() {
+            for j in (0..b.len()).filter(|&j| same(i, j)) {
+                let (name, own) = (short(&targets[i].name), cost(i, j));
+                let nearer = |c: f64, other: String| {
+                    if c < own {
+                        println!(
+                            "<!-- {title}, weight {size_weight}: {name} {own:.4}, but {c:.4} from {other} -->"
+                        );
+                    }
+                };
+                (0..b.len())
+                    .for_each(|k| nearer(cost(i, k), format!("the source's {}", short(&sources[k].name))));
+                (0..a.len())
+                    .for_each(|k| nearer(cost(k, j), format!("the target's {}", short(&targets[k].name))));
+            }
+        }
         let right = found.pairs.iter().filter(|p| same(p.target, p.source)).count();
         let wrong: Vec<_> = found.pairs.iter().filter(|p| !same(p.target, p.source)).collect();
         let flagged = |w: bool| {

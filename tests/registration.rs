@@ -498,6 +498,36 @@ fn a_set_names_another_of_other_size_hand_and_order() {
     );
 }
 
+/// A bone whose marrow was left out is still that bone: the outer surface counts.
+#[test]
+fn a_second_surface_within_the_first_does_not_make_another_shape() {
+    let outer = lump(1.0);
+    let mut hollow = outer.clone();
+    let count = outer.points.len() as u32;
+    hollow.points.extend(outer.points.iter().map(|p| *p * 0.6));
+    let turned = outer
+        .triangles
+        .iter()
+        .map(|t| [t[0] + count, t[2] + count, t[1] + count]);
+    hollow.triangles.extend(turned);
+    let whole = moved(&outer, &motion(9));
+    let named = |set: &TriangleMesh| {
+        let (a, b) = ([RegistrationShape::mesh(set)], [RegistrationShape::mesh(&whole)]);
+        name_shapes(&a, &b, &NamingSettings::default()).expect("sound meshes")
+    };
+    let (plain, found) = (named(&outer), named(&hollow));
+    assert!(
+        found.differences[0][0] < plain.differences[0][0] + 0.01,
+        "{:?}",
+        found.differences
+    );
+    assert!(
+        (found.size_ratios[0][0] - 1.0).abs() < 0.02,
+        "{:?}",
+        found.size_ratios
+    );
+}
+
 #[test]
 fn results_do_not_depend_on_the_number_of_threads() {
     let shape = lump(1.0);

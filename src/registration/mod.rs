@@ -6,13 +6,13 @@
 //! 1. [`oriented`](self): both surfaces become oriented samples; raw clouds lose what lies alone
 //!    and are de-noised.
 //! 2. Whole shapes: first guesses from moments and scaffolds, refined on the surfaces, symmetric distance decides.
-//! 3. Partial shapes, when the surfaces ask for it: poses from oriented point pairs, free space decides.
+//! 3. Partial shapes, when the surfaces ask for it: poses from oriented point pairs, at several sizes when the size is unknown; free space decides.
 //! 4. Ambiguity, conditioning, precision and overlap of the chosen pose.
 //!
 //! | file | idea |
 //! |---|---|
 //! | `shape`, `settings`, `result` | what goes in and what comes out |
-//! | `oriented`, `isolated`, `denoise`, `walls`, `cells`, `nearest_grid`, `exact` | a surface prepared for search |
+//! | `oriented`, `isolated`, `outer`, `denoise`, `walls`, `cells`, `nearest_grid`, `exact` | a surface prepared for search |
 //! | `faces` | which hand and which face of a thin sheet may be outside |
 //! | `surface` | whole shapes |
 //! | `partial`, `pairs`, `sizes` | partial shapes, also of unknown size |
@@ -34,6 +34,7 @@ mod isolated;
 pub mod naming;
 mod nearest_grid;
 mod oriented;
+mod outer;
 mod pairs;
 mod partial;
 mod precision;

@@ -2,7 +2,8 @@
 //!
 //! In: two sets of [`RegistrationShape`]s. Out: a [`Naming`]: pairs one to one, what parts them, and which of them are in doubt.
 //!
-//! 1. Every shape becomes a view at its own size (its radius of gyration is the unit), so that size is out of the comparison.
+//! 1. Every shape becomes a view at its own size (its radius of gyration is the unit), so that size is out of the comparison;
+//!    of a surface with another within it the outer one ([`super::outer`]).
 //! 2. Every pair is laid on each other with a similarity ([`super::surface`], the survey of whole shapes); the symmetric root mean square distance
 //!    that is left, as a share of the size, is their difference `d`.
 //! 3. Two persons differ in size by a factor that all their bones share, and by little more. So what counts is not the ratio of
@@ -19,9 +20,11 @@
 //! named whole.
 
 use super::oriented::{self, View};
+use super::outer::outer_samples;
 use super::settings::{Mirror, RegistrationSettings};
-use super::shape::{RegistrationError, RegistrationShape};
+use super::shape::{RegistrationError, RegistrationShape, Surface};
 use super::surface::{Distances, survey};
+use glam::DVec3;
 use matchers::{Table, assignment};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -30,6 +33,9 @@ use serde::{Deserialize, Serialize};
 const SAMPLES: usize = 1500;
 /// Samples that measure the difference of a pair.
 const MEASURED: usize = 1000;
+/// Share of the samples that must lie within the shape to be left out, and the fewest that must remain.
+const HIDDEN: f64 = 0.1;
+const FEWEST_OUTSIDE: usize = 100;
 /// Most factors of size tried.
 const MOST_FACTORS: usize = 200;
 /// Rounds in which the factor follows the pairs.
@@ -163,11 +169,34 @@ fn sized_views(
         .map(|shape| {
             // The search wants lengths in diagonals.
             let diagonal = oriented::diagonal(shape.points());
-            let view = View::new(shape, diagonal, defaults.samples, seed);
+            let view = outside(View::new(shape, diagonal, defaults.samples, seed));
             let size_mm = view.gyration() * diagonal;
             Sized { view, size_mm }
         })
         .collect())
+}
+
+/// The view without what lies within it, when that is a good part of it.
+fn outside(view: View) -> View {
+    let outer = outer_samples(&view);
+    let kept = |all: &[DVec3]| -> Vec<DVec3> {
+        let both = all.iter().zip(&outer);
+        both.filter(|(_, outer)| **outer).map(|(p, _)| *p).collect()
+    };
+    let (points, normals) = (kept(&view.points), kept(&view.normals));
+    let hidden = view.points.len() - points.len();
+    if (hidden as f64) < HIDDEN * view.points.len() as f64 || points.len() < FEWEST_OUTSIDE {
+        return view;
+    }
+    let normals = Some(normals.as_slice());
+    let shape = RegistrationShape {
+        surface: Surface::Cloud {
+            points: &points,
+            normals,
+        },
+        scaffold: None,
+    };
+    View::new(&shape, 1.0, points.len(), 0)
 }
 
 /// The naming for one hand with its cost.

@@ -11,6 +11,9 @@
 //!
 //! A second round with ten times the poses runs when the best score is below 0.4 or a rival over 15 degrees away is within 0.4.
 //!
+//! Of unknown size: the source at seven sizes ([`super::sizes`]), each with four tenths of the poses, a second round for the best two of them when
+//! needed; the last refinement has the size as its seventh unknown.
+//!
 //! Measured on carpals, both cut to two thirds by opposite half-spaces, 1 % noise: every stage above is wide enough that the
 //! right pose survives; see `BENCHMARKS.md`. Cost: about 0.3 s of one core after the views are made, 1 s for a second round.
 

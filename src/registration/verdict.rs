@@ -7,6 +7,8 @@
 //! 3. Otherwise the partial search runs too, and wins when free space says so; a doubt is raised when the whole pose is another one
 //!    and neither shape has a part that the other lacks.
 //! 4. A mirrored pose must be clearly better than an unmirrored one.
+//! 5. Two kinds of doubt: a pose is *ambiguous* when another one may be right instead, *uncertain* when it is known to more than five degrees
+//!    only, by its standard errors or because the shapes differ and fits to all and to the part that agrees end that far apart.
 
 use super::faces::{ViewPair, pairs};
 use super::isolated::without_isolated;
