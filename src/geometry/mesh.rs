@@ -205,13 +205,14 @@ impl DisjointSets {
 
 /// One side of a triangle: the edge by its smaller and larger vertex, the triangle, and whether it runs low to high.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Side {
-    edge: (u32, u32),
-    triangle: u32,
-    forward: bool,
+pub(crate) struct Side {
+    pub edge: (u32, u32),
+    pub triangle: u32,
+    pub forward: bool,
 }
 
-fn topology(triangles: &[[u32; 3]], points: usize) -> MeshTopology {
+/// The sides of all triangles, those of one edge together, in order.
+pub(crate) fn sides(triangles: &[[u32; 3]]) -> Vec<Side> {
     let mut sides: Vec<Side> = triangles
         .iter()
         .enumerate()
@@ -224,6 +225,11 @@ fn topology(triangles: &[[u32; 3]], points: usize) -> MeshTopology {
         })
         .collect();
     sides.sort_unstable();
+    sides
+}
+
+fn topology(triangles: &[[u32; 3]], points: usize) -> MeshTopology {
+    let sides = sides(triangles);
     let mut out = MeshTopology {
         triangles: triangles.len(),
         orientable: true,

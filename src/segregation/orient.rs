@@ -5,6 +5,7 @@
 //! signed volume. `O(n log n)`.
 
 use super::openness::area;
+use crate::geometry::mesh::{Side, sides};
 use glam::DVec3;
 
 /// Oriented triangles.
@@ -16,28 +17,9 @@ pub struct Oriented {
     pub orientable: bool,
 }
 
-/// One directed side of a triangle.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Side {
-    edge: (u32, u32),
-    triangle: u32,
-    forward: bool,
-}
-
 /// Propagates orientation; see the module.
 pub fn orient(points: &[DVec3], triangles: &[[u32; 3]]) -> Oriented {
-    let mut sides: Vec<Side> = triangles
-        .iter()
-        .enumerate()
-        .flat_map(|(i, t)| {
-            [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])].map(|(a, b)| Side {
-                edge: (a.min(b), a.max(b)),
-                triangle: i as u32,
-                forward: a < b,
-            })
-        })
-        .collect();
-    sides.sort_unstable();
+    let sides = sides(triangles);
     // Neighbours across manifold edges, with whether both run the edge the same way (then one must be turned).
     let mut links: Vec<Vec<(u32, bool)>> = vec![Vec::new(); triangles.len()];
     for run in sides.chunk_by(|a, b| a.edge == b.edge) {
