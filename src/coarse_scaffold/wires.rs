@@ -61,7 +61,8 @@ pub(crate) fn wire_persistence(
     let mut queue = Queue::new();
     for (w, wire) in wires.iter().enumerate() {
         out[wire.chain] = network.fine.scale.diagonal_mm;
-        (0..2).for_each(|side| queue.push(0.0, (2 * w + side) as u32));
+        // What a side costs at least: a bone's sheets are not measured while the wire can go with its tip.
+        (0..2).for_each(|side| queue.push(blocks[wire.blocks[side]].persistence, (2 * w + side) as u32));
     }
     while let Some((known, id)) = queue.pop() {
         let (w, side) = (id as usize / 2, id as usize % 2);
@@ -227,13 +228,24 @@ impl Witnesses {
         }
     }
 
+    /// A tree of the balls left, where a search among all would pass over too many that are gone.
+    fn rebuilt(&self, network: &Network, leaving: usize) -> Option<BallTree> {
+        let left: Vec<u32> = (0..self.left.len() as u32)
+            .filter(|&v| self.left[v as usize])
+            .collect();
+        let fine = network.fine;
+        (leaving > left.len()).then(|| BallTree::new(left, &fine.vertex_position, &fine.vertex_radius))
+    }
+
     /// How far the surface moves when some vertices go, mm at the scale of persistences.
     fn movement(&mut self, network: &Network, leaving: impl Iterator<Item = u32>) -> f64 {
         let leaving: Vec<u32> = leaving.filter(|&v| self.left[v as usize]).collect();
         leaving.iter().for_each(|&v| self.left[v as usize] = false);
+        let rebuilt = self.rebuilt(network, leaving.len());
+        let tree = rebuilt.as_ref().unwrap_or(&self.tree);
         let share = |g: u32| {
             let point = network.fine.generator_position[g as usize];
-            let near = self.tree.nearest(point, None, |v| self.left[v as usize]);
+            let near = tree.nearest(point, None, |v| self.left[v as usize]);
             near.map_or(0.0, |b| b.distance.max(0.0) / self.tolerance_mm[g as usize])
         };
         let hosted = leaving.iter().flat_map(|&v| &self.hosted[v as usize]);
@@ -246,6 +258,9 @@ impl Witnesses {
     fn remove(&mut self, network: &Network, leaving: impl Iterator<Item = u32>) {
         let leaving: Vec<u32> = leaving.filter(|&v| self.left[v as usize]).collect();
         leaving.iter().for_each(|&v| self.left[v as usize] = false);
+        if let Some(tree) = self.rebuilt(network, leaving.len()) {
+            self.tree = tree;
+        }
         for v in leaving {
             for g in std::mem::take(&mut self.hosted[v as usize]) {
                 let point = network.fine.generator_position[g as usize];
