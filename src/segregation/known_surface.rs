@@ -290,17 +290,13 @@ pub(super) struct EnclosingPart {
     pub cavity: bool,
 }
 
-/// Volume below which a component encloses nothing, as a share of the volume that its area could enclose.
-const NO_VOLUME: f64 = 1e-9;
-
 /// The components of a closed surface that enclose volume, by Euler number. Segmentation programs leave pairs of triangles back to
 /// back; such a part has no inside, so no labels can show it.
 pub(super) fn enclosing_parts(surface: &TriangleMesh) -> Vec<EnclosingPart> {
     let mut out: Vec<EnclosingPart> = surface
-        .components()
+        .solid_components()
         .iter()
         .map(|c| surface.submesh(c))
-        .filter(|part| part.signed_volume().abs() > NO_VOLUME * part.area().powf(1.5))
         .map(|part| EnclosingPart {
             euler: part.topology().euler,
             cavity: part.signed_volume() < 0.0,
