@@ -8,13 +8,13 @@
 //!
 //! 1. Find the lines ([`find`]): places where two planes explain the neighbours, three or four of their halves being there, traced
 //!    from station to station, one spacing apart.
-//! 2. Tell the points near a line apart by half sheet ([`line`]); those within half a spacing of it are replaced by its stations,
+//! 2. Tell the points near a line apart by half sheet ([`mod@line`]); those within half a spacing of it are replaced by its stations,
 //!    the others are smoothed by their own sheet's points alone when the cloud is noisy.
 //! 3. Take out the triangles within a few spacings, the farther the smaller the angle, and triangulate each sheet anew in its own
 //!    two coordinates, along the line and off it, with the line and the rim of what was left as constraints ([`sheet`]).
 //!
 //! 4. Where half sheets are nearer to each other than their points are apart, triangles of step 3 are no facets of the
-//!    three-dimensional triangulation, which the scaffold needs: points are added on them until they are ([`conform`]).
+//!    three-dimensional triangulation, which the scaffold needs: points are added on them until they are (`conform`).
 //!
 //! Cost: a plane fit a point, then what lies near lines. Sheets through three lines that meet in a point are joined up to a few
 //! spacings of it only.
