@@ -8,15 +8,17 @@
 //! flat, so it costs next to nothing to change them. The price of a tetrahedron is the distance of its centroid from the
 //! surface: how far the surface moves when its label does.
 //!
-//! 1. **Deepest first.** From the deepest tetrahedron of each solid part the inside is grown without a change of topology
+//! 1. **Openings.** Cavities that the surface does not have (a pocket whose channel the sampling closes) are opened to the outside along the
+//!    way whose dearest tetrahedron is cheapest; of several cavities those with the deepest tetrahedra may stay.
+//! 2. **Deepest first.** From the deepest tetrahedron of each solid part the inside is grown without a change of topology
 //!    ([`super::homotopic_growth`]). What is left are walls: one across every handle at its narrowest, one in a tube from every cavity
 //!    to the outside, and some where the order of growth was unlucky. They are put back, dearest first, where the topology
 //!    comes no farther from the surface's: real handles are the thickest.
-//! 2. **Beyond.** The growth goes on into the outside, cheapest first, up to [`MOST_MOVED`] spacings, and so reaches pieces of
+//! 3. **Beyond.** The growth goes on into the outside, cheapest first, up to [`MOST_MOVED`] spacings, and so reaches pieces of
 //!    the inside that hang together with the rest by less than the labels show.
-//! 3. **Back.** What should be outside is taken away again, dearest first, where that does not change the topology. What stays is
+//! 4. **Back.** What should be outside is taken away again, dearest first, where that does not change the topology. What stays is
 //!    what joins the pieces.
-//! 4. **Walls.** Of the walls, which the growth beyond may not touch (it would fill a cavity whose tube is left open), comes back what
+//! 5. **Walls.** Of the walls, which the growth beyond may not touch (it would fill a cavity whose tube is left open), comes back what
 //!    can; and every set of changed tetrahedra gets its first labels again where that leaves the topology right.
 //!
 //! Every growth keeps the topology of the step before. The result is checked against the surface all the same, and
@@ -35,6 +37,8 @@ use crate::geometry::{TetId, TriangleMesh};
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::cmp::{Ordering, Reverse};
+use std::collections::BinaryHeap;
 
 /// Farthest that the surface may move, in spacings (`sqrt(area / generators)`): the distance within which a surface found anew counts as right.
 pub const MOST_MOVED: f64 = 2.0;
@@ -102,6 +106,7 @@ pub(super) fn repair_topology(
 struct Wanted {
     /// Solid parts.
     parts: usize,
+    cavities: usize,
     /// Euler numbers of the surface's components, sorted.
     eulers: Vec<i64>,
 }
@@ -111,6 +116,7 @@ impl Wanted {
         let components = enclosing_parts(surface);
         Self {
             parts: components.iter().filter(|p| !p.cavity).count(),
+            cavities: components.iter().filter(|p| p.cavity).count(),
             eulers: components.into_iter().map(|p| p.euler).collect(),
         }
     }
@@ -132,12 +138,13 @@ impl Repair<'_> {
         self.price_mm[tet.index()]
     }
 
-    /// Steps 1 to 4.
+    /// Steps 1 to 5.
     fn grow_and_shrink(&self) -> Vec<bool> {
         let t = self.triangulation;
-        let first = |tet: TetId| self.first[tet.index()];
+        let opened = self.openings();
+        let first = |tet: TetId| self.first[tet.index()] && !opened[tet.index()];
         let price = |tet: TetId| self.price(tet);
-        let mut parts = self.parts();
+        let mut parts = self.parts(true);
         let seeds = self.seeds(&mut parts);
         let solid = grow(t, &seeds, first, price);
         let left = walls(t, &solid, first);
@@ -149,7 +156,7 @@ impl Repair<'_> {
         }
         let mut near = |tet: TetId| match (t.is_finite(tet), first(tet)) {
             (true, true) => !seeded[parts.find(tet.0) as usize],
-            (finite, _) => finite && self.price(tet) <= MOST_MOVED * self.spacing_mm,
+            (finite, _) => finite && !opened[tet.index()] && self.price(tet) <= MOST_MOVED * self.spacing_mm,
         };
         let may: Vec<bool> = t.tets().map(&mut near).collect();
         let depth = |tet: TetId| if first(tet) { price(tet) } else { -price(tet) };
@@ -208,17 +215,73 @@ impl Repair<'_> {
             .then(|| component_eulers(&mesh))
     }
 
-    /// Connected parts of the inside, as sets of tetrahedra.
-    fn parts(&self) -> DisjointSets {
+    /// Connected parts of a side, as sets of tetrahedra.
+    fn parts(&self, side: bool) -> DisjointSets {
         let t = self.triangulation;
         let mut sets = DisjointSets::new(t.num_tets());
         for facet in t.facets() {
             let other = t.mirror(facet).tet;
-            if self.first[facet.tet.index()] && self.first[other.index()] {
+            if self.first[facet.tet.index()] == side && self.first[other.index()] == side {
                 sets.union(facet.tet.0, other.0);
             }
         }
         sets
+    }
+
+    /// Step 1: the inside tetrahedra on the cheapest ways from the cavities that should not be to the outside.
+    fn openings(&self) -> Vec<bool> {
+        let t = self.triangulation;
+        let mut sets = self.parts(false);
+        let mut opened = vec![false; t.num_tets()];
+        let Some(ghost) = t.tets().nth(t.num_finite()) else {
+            return opened;
+        };
+        let mut order: Vec<TetId> = t.finite_tets().filter(|x| !self.first[x.index()]).collect();
+        order.sort_by(|a, b| self.price(*b).total_cmp(&self.price(*a)).then(a.cmp(b)));
+        let mut met = vec![false; t.num_tets()];
+        met[sets.find(ghost.0) as usize] = true;
+        let cavities: Vec<TetId> = order
+            .into_iter()
+            .filter(|tet| !std::mem::replace(&mut met[sets.find(tet.0) as usize], true))
+            .skip(self.wanted.cavities)
+            .collect();
+        for cavity in cavities {
+            let way = self.way_out(cavity, |tet| sets.find(tet.0) == sets.find(ghost.0));
+            for tet in way {
+                opened[tet.index()] = self.first[tet.index()];
+            }
+        }
+        opened
+    }
+
+    /// The tetrahedra on the way from one to the first that is `out`, whose dearest inside tetrahedron is cheapest, and of those ways a short
+    /// one. Dijkstra's, with the maximum for the sum.
+    fn way_out(&self, from: TetId, mut out: impl FnMut(TetId) -> bool) -> Vec<TetId> {
+        let t = self.triangulation;
+        let mut came = vec![None; t.num_tets()];
+        came[from.index()] = Some(from);
+        let mut queue = Queue::new();
+        queue.push(0.0, 0, from);
+        while let Some((dearest, steps, tet)) = queue.pop() {
+            if out(tet) {
+                let mut way = vec![tet];
+                let mut at = tet;
+                while let Some(before) = came[at.index()].filter(|&b| b != at) {
+                    way.push(before);
+                    at = before;
+                }
+                return way;
+            }
+            for next in (0..4).map(|k| t.neighbour(tet, k)) {
+                if came[next.index()].is_none() {
+                    came[next.index()] = Some(tet);
+                    let inside = self.first[next.index()];
+                    let price = if inside { self.price(next) } else { 0.0 };
+                    queue.push(f64::max(dearest, price), steps + 1, next);
+                }
+            }
+        }
+        Vec::new()
     }
 
     /// The deepest tetrahedra of as many inside parts as are wanted, the deepest parts first.
@@ -288,6 +351,42 @@ impl Repair<'_> {
             .collect();
         out.sort_by(|a, b| b.moved_mm.total_cmp(&a.moved_mm));
         out
+    }
+}
+
+/// Tetrahedra by the dearest on the way to them, then by steps, then by id.
+struct Queue(BinaryHeap<Reverse<(OrderedPrice, u32, TetId)>>);
+
+/// A price in its total order.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct OrderedPrice(f64);
+
+impl Eq for OrderedPrice {}
+
+impl Ord for OrderedPrice {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.0.total_cmp(&other.0)
+    }
+}
+
+impl PartialOrd for OrderedPrice {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Queue {
+    fn new() -> Self {
+        Self(BinaryHeap::new())
+    }
+
+    fn push(&mut self, dearest: f64, steps: u32, tet: TetId) {
+        self.0.push(Reverse((OrderedPrice(dearest), steps, tet)));
+    }
+
+    fn pop(&mut self) -> Option<(f64, u32, TetId)> {
+        let Reverse((OrderedPrice(dearest), steps, tet)) = self.0.pop()?;
+        Some((dearest, steps, tet))
     }
 }
 
