@@ -19,7 +19,8 @@
 //! | `score`, `refine`, `solve` | shared by both: free space, closest points, one linear step |
 //! | `significance` | whether one whole pose is better than another by more than the shapes differ |
 //! | `precision` | how precisely the pose is known |
-//! | `verdict` | which pose is reported and what is said of it |
+//! | `verdict` | which pose is reported |
+//! | `doubts` | what is said of it |
 //! | [`naming`] | which shape of one set is which of another |
 //! | [`difference`](mod@difference) | what is left between the shapes in that pose |
 //!
@@ -28,6 +29,7 @@
 mod cells;
 mod denoise;
 pub mod difference;
+mod doubts;
 mod exact;
 mod faces;
 mod isolated;

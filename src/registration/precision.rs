@@ -20,6 +20,7 @@
 
 use super::oriented::View;
 use super::refine::{Level, each_pair};
+use super::solve::motion_row;
 use crate::geometry::Rigid;
 use glam::DVec3;
 use nalgebra::{SMatrix, SVector};
@@ -123,18 +124,10 @@ pub(crate) fn standard_errors(
 fn patches(rows: &[Row], centre: DVec3, edge: f64, scale: bool) -> Vec<Patch> {
     let mut cells: BTreeMap<[i64; 3], Patch> = BTreeMap::new();
     for &(place, direction, pull, curvature) in rows {
-        let arm = place - centre;
-        let turn = arm.cross(direction);
-        let growth = if scale { arm.dot(direction) } else { 0.0 };
-        let row = SVector::<f64, 7>::from([
-            turn.x,
-            turn.y,
-            turn.z,
-            direction.x,
-            direction.y,
-            direction.z,
-            growth,
-        ]);
+        let mut row = SVector::<f64, 7>::from(motion_row(place - centre, direction));
+        if !scale {
+            row[6] = 0.0;
+        }
         let key = (place / edge).floor().as_i64vec3().to_array();
         let patch = cells.entry(key).or_insert_with(|| Patch {
             gradient: SVector::zeros(),

@@ -9,6 +9,21 @@ use crate::geometry::Rigid;
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{SMatrix, SVector};
 
+/// How much a small turn about the three axes, a shift along them and a growth move a point at `arm` from their centre along `direction`.
+#[inline]
+pub(crate) fn motion_row(arm: DVec3, direction: DVec3) -> [f64; 7] {
+    let turn = arm.cross(direction);
+    [
+        turn.x,
+        turn.y,
+        turn.z,
+        direction.x,
+        direction.y,
+        direction.z,
+        arm.dot(direction),
+    ]
+}
+
 /// The normal equations of a fit about a fixed centre.
 pub(crate) struct NormalEquations {
     centre: DVec3,
@@ -39,16 +54,7 @@ impl NormalEquations {
     #[inline]
     pub(crate) fn add(&mut self, place: DVec3, direction: DVec3, residual: f64, weight: f64) {
         let arm = place - self.centre;
-        let turn = arm.cross(direction);
-        let row = [
-            turn.x,
-            turn.y,
-            turn.z,
-            direction.x,
-            direction.y,
-            direction.z,
-            arm.dot(direction),
-        ];
+        let row = motion_row(arm, direction);
         for i in 0..7 {
             let wi = weight * row[i];
             for j in 0..=i {
