@@ -4,6 +4,7 @@
 //! cargo run --release --example regularisation_table -- analytic [names...]
 //! cargo run --release --example regularisation_table -- bones [points [first words of variants...]]
 //! cargo run --release --example regularisation_table -- speed [points]
+//! cargo run --release --example regularisation_table -- corners [points]
 //! cargo run --release --example regularisation_table -- draw SHAPE_OR_FILE points tolerance picture.png
 //! cargo run --release --example regularisation_table -- list SHAPE_OR_FILE points seed
 //! cargo run --release --example regularisation_table -- pairs FILE points
@@ -13,7 +14,7 @@
 mod support;
 
 use glam::DVec3;
-use medial_scaffold::coarse_scaffold::CurveKind;
+use medial_scaffold::coarse_scaffold::{CoarseScaffold, CurveKind, NodeKind};
 use medial_scaffold::geometry::{Length, TriangleMesh};
 use medial_scaffold::regularise::RegulariseSettings;
 use std::error::Error;
@@ -32,11 +33,12 @@ fn main() -> Result<(), Box<dyn Error>> {
             &arguments[2.min(arguments.len())..],
         ),
         Some("speed") => speed_table(word(1).unwrap_or("100000").parse()?),
+        Some("corners") => corner_table(word(1).unwrap_or("10000").parse()?),
         Some("draw") if arguments.len() == 5 => draw(&arguments[1..]),
         Some("list") if arguments.len() == 4 => list(&arguments[1..]),
         Some("pairs") if arguments.len() == 3 => pairs(&arguments[1..]),
         _ => Err(
-            "say analytic, bones, speed, draw SHAPE points tolerance picture.png, or list SHAPE points seed"
+            "say analytic, bones, speed, corners, draw SHAPE points tolerance picture.png, or list SHAPE points seed"
                 .into(),
         ),
     }
@@ -113,6 +115,33 @@ fn speed_table(n: usize) -> Result<(), Box<dyn Error>> {
             r.seconds_fine,
             r.seconds_regularise,
             r.seconds_coarse
+        );
+    }
+    Ok(())
+}
+
+/// Where the ribs of bones are cut at corners, in two samplings of each.
+fn corner_table(n: usize) -> Result<(), Box<dyn Error>> {
+    println!("| shape | cuts with seed 1 | with seed 2 | of them at one place |");
+    println!("|---|---|---|---|");
+    for file in bones() {
+        let mesh = read_mesh(&file)?;
+        let one = settings(Length::PercentDiagonal(1.0));
+        let [first, second] = [1, 2].map(|seed| run(&sample(&mesh, n, seed), &mesh, &one));
+        let (first, second) = (first?.coarse, second?.coarse);
+        let near = 5.0 * first.tolerance_mm;
+        let corners = |s: &CoarseScaffold| -> Vec<DVec3> {
+            let own = s.nodes.iter().filter(|n| n.kind == NodeKind::Corner);
+            own.map(|n| n.position).collect()
+        };
+        let (a, b) = (corners(&first), corners(&second));
+        let both = a.iter().filter(|p| b.iter().any(|q| p.distance(*q) < near));
+        println!(
+            "| {} | {} | {} | {} |",
+            file.file_stem().unwrap_or_default().to_string_lossy(),
+            a.len(),
+            b.len(),
+            both.count()
         );
     }
     Ok(())

@@ -549,3 +549,82 @@ fn every_border_of_the_sheets_of_bones_is_a_curve_or_a_node() {
         check_borders(&fine, &coarse);
     }
 }
+
+/// A winding band of the given width and thickness along `y = sin(2 pi x / 8)`, with the point and normal of its middle line at `x`.
+fn winding_band(
+    width: f64,
+    thickness: f64,
+) -> (datasets_synthetic::TriangleMesh, impl Fn(f64) -> [glam::DVec2; 2]) {
+    let middle = |x: f64| {
+        let turn = std::f64::consts::TAU / 8.0;
+        let across = glam::DVec2::new(-turn * (turn * x).cos(), 1.0).normalize();
+        [glam::DVec2::new(x, (turn * x).sin()), across]
+    };
+    let stations = 400u32;
+    let mut mesh = datasets_synthetic::TriangleMesh::default();
+    for i in 0..=stations {
+        let [at, across] = middle(30.0 * f64::from(i) / f64::from(stations));
+        for (side, z) in [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)] {
+            mesh.points
+                .push((at + side * width * across).extend(z * thickness));
+        }
+    }
+    let mut square = |[a, b, c, d]: [u32; 4]| mesh.triangles.extend([[a, b, c], [a, c, d]]);
+    for i in 0..stations {
+        let ring = |k: u32| {
+            [
+                4 * i + k,
+                4 * i + (k + 1) % 4,
+                4 * i + 4 + (k + 1) % 4,
+                4 * i + 4 + k,
+            ]
+        };
+        (0..4).for_each(|k| square(ring(k)));
+    }
+    square([3, 2, 1, 0]);
+    square([0, 1, 2, 3].map(|k| 4 * stations + k));
+    (mesh, middle)
+}
+
+#[test]
+fn a_winding_strip_keeps_its_ribs_on_its_borders_and_its_mesh_between_them() {
+    // Half as wide as ribs are smoothed over elsewhere.
+    let (width, thickness) = (2.4, 0.5);
+    let (mesh, middle) = winding_band(width, thickness);
+    let outline: Vec<glam::DVec2> = (0..=2000)
+        .flat_map(|i| {
+            let [at, across] = middle(30.0 * f64::from(i) / 2000.0);
+            [-0.5, 0.5].map(|side| at + side * (width - thickness) * across)
+        })
+        .collect();
+    for seed in 1..=2 {
+        let points = datasets_synthetic::sample_poisson(&mesh, 12_000, seed).points;
+        let s = scaffold_of(fine_of_mesh(&mesh, points), Length::Millimetres(1.2));
+        assert_eq!(counts(&s), [1, 0, 1, 0, 0]);
+        let rib: Vec<DVec3> = s.curves[0].polyline.iter().map(|p| p.position).collect();
+        // But for the ends, where the strip ends in an edge across.
+        for p in rib.iter().filter(|p| (2.0..28.0).contains(&p.x)) {
+            let off = outline
+                .iter()
+                .map(|q| q.distance(p.truncate()))
+                .fold(f64::INFINITY, f64::min);
+            assert!(off < 0.4, "{p} is {off} off");
+        }
+        // In its plane the mesh covers each place once: its triangles have the area that the rib goes round.
+        let flat = |p: DVec3| p.truncate();
+        let round: f64 = (0..rib.len())
+            .map(|k| 0.5 * flat(rib[k]).perp_dot(flat(rib[(k + 1) % rib.len()])))
+            .sum();
+        let sheet = &s.sheets[0].mesh;
+        let covered: f64 = sheet
+            .triangles
+            .iter()
+            .map(|t| t.map(|v| flat(sheet.vertices[v as usize].position)))
+            .map(|[a, b, c]| 0.5 * (b - a).perp_dot(c - a).abs())
+            .sum();
+        assert!(
+            (covered / round.abs() - 1.0).abs() < 0.02,
+            "{covered} within {round}"
+        );
+    }
+}

@@ -6,7 +6,9 @@ use crate::fine_scaffold::complex::NONE;
 use crate::geometry::{CurveId, SheetId};
 use glam::DVec3;
 use nalgebra::{Matrix3, SymmetricEigen};
-use std::collections::BTreeMap;
+use ordered_float::OrderedFloat;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap};
 
 /// Length of a polyline, mm; a closed one returns to its start.
 pub(crate) fn length(polyline: &[MedialPoint], closed: bool) -> f64 {
@@ -23,9 +25,14 @@ pub(crate) fn length(polyline: &[MedialPoint], closed: bool) -> f64 {
 /// Smooths positions and radii along a curve with a Gaussian of standard deviation `width_mm` over arc length; the ends of an
 /// open curve stay, because the curve is continued beyond them by its point reflection.
 pub(crate) fn smooth(polyline: &mut [MedialPoint], closed: bool, width_mm: f64) {
+    smooth_by(polyline, closed, |_| width_mm);
+}
+
+/// As [`smooth`] with a width for each point; where it is 0, the point stays.
+pub(crate) fn smooth_by(polyline: &mut [MedialPoint], closed: bool, width_mm: impl Fn(usize) -> f64) {
     const CUT: f64 = 2.5;
     let n = polyline.len();
-    if n < 3 || width_mm <= 0.0 {
+    if n < 3 {
         return;
     }
     let mut at = vec![0.0; n];
@@ -35,7 +42,6 @@ pub(crate) fn smooth(polyline: &mut [MedialPoint], closed: bool, width_mm: f64) 
     let round = at[n - 1] + polyline[n - 1].position.distance(polyline[0].position);
     // A kernel wider than a third of the curve would see the curve twice.
     let whole = if closed { round } else { at[n - 1] };
-    let width = width_mm.min(whole / 6.0);
     // Point k of the endless continuation: arc length, position and radius.
     let (first, last) = (polyline[0], polyline[n - 1]);
     let point = |k: isize| -> (f64, DVec3, f64) {
@@ -71,7 +77,10 @@ pub(crate) fn smooth(polyline: &mut [MedialPoint], closed: bool, width_mm: f64) 
             if !closed && (i == 0 || i == n - 1) {
                 return polyline[i];
             }
-            let here = at[i];
+            let (here, width) = (at[i], width_mm(i).min(whole / 6.0));
+            if width <= 0.0 {
+                return polyline[i];
+            }
             let (mut weight, mut position, mut radius) = (0.0, DVec3::ZERO, 0.0);
             let mut add = |k: isize| {
                 let (s, p, r) = point(k);
@@ -105,12 +114,12 @@ pub(crate) fn smooth(polyline: &mut [MedialPoint], closed: bool, width_mm: f64) 
     polyline.copy_from_slice(&smoothed);
 }
 
-/// As [`smooth`], but bends do not shrink, up to the fourth power of width over radius: what a second smoothing takes away is what the first
+/// As [`smooth_by`], but bends do not shrink, up to the fourth power of width over radius: what a second smoothing takes away is what the first
 /// one took of the smooth part, and is given back ("twicing", Tukey, "Exploratory Data Analysis", 1977).
-pub(crate) fn smooth_in_place(polyline: &mut [MedialPoint], closed: bool, width_mm: f64) {
-    smooth(polyline, closed, width_mm);
+pub(crate) fn smooth_in_place(polyline: &mut [MedialPoint], closed: bool, width_mm: impl Fn(usize) -> f64) {
+    smooth_by(polyline, closed, &width_mm);
     let mut again = polyline.to_vec();
-    smooth(&mut again, closed, width_mm);
+    smooth_by(&mut again, closed, &width_mm);
     for (p, again) in polyline.iter_mut().zip(&again) {
         p.position = 2.0 * p.position - again.position;
         p.radius = (2.0 * p.radius - again.radius).max(0.0);
@@ -198,6 +207,8 @@ pub(crate) fn principal(covariance: Matrix3<f64>, centroid: DVec3) -> SheetMomen
 
 /// Rings of vertices behind the border that give way when the border is moved to the smooth curves.
 const GIVE_WAY: u32 = 5;
+/// Where the border moves further than those rings are wide, what lies within this many times as far gives way.
+const FOLLOW: f64 = 2.0;
 /// Passes of relaxation of those vertices.
 const RELAX: u32 = 30;
 
@@ -233,26 +244,13 @@ fn mesh(fine: &FineScaffold, facets: &[u32], border: &BTreeMap<u32, MedialPoint>
         .collect();
     near.sort_unstable();
     near.dedup();
-    // Steps from the border, up to the last ring that gives way.
-    let mut ring = vec![u32::MAX; used.len()];
-    for (i, v) in used.iter().enumerate() {
-        if let Some(&p) = border.get(v) {
-            ring[i] = 0;
-            vertices[i] = p;
-        }
-    }
-    for step in 0..GIVE_WAY {
-        for &[a, b] in &near {
-            if ring[a as usize] == step && ring[b as usize] == u32::MAX {
-                ring[b as usize] = step + 1;
-            }
-        }
-    }
+    let on_border: Vec<Option<MedialPoint>> = used.iter().map(|v| border.get(v).copied()).collect();
+    let free = give_way(&mut vertices, &near, &on_border);
     for _ in 0..RELAX {
         let old = vertices.clone();
         for own in near.chunk_by(|x, y| x[0] == y[0]) {
             let i = own[0][0] as usize;
-            if ring[i] == 0 || ring[i] == u32::MAX {
+            if !free[i] {
                 continue;
             }
             let n = own.len() as f64;
@@ -265,6 +263,60 @@ fn mesh(fine: &FineScaffold, facets: &[u32], border: &BTreeMap<u32, MedialPoint>
         }
     }
     SheetMesh { vertices, triangles }
+}
+
+/// Puts the border of a mesh where it belongs and tells which other vertices give way: a few rings behind it, and where it moves
+/// far, all that it might sweep over, which is moved along, the less the further away. `near` are the pairs of neighbours in order.
+fn give_way(vertices: &mut [MedialPoint], near: &[[u32; 2]], border: &[Option<MedialPoint>]) -> Vec<bool> {
+    let exact = vertices.to_vec();
+    // Steps from the border, up to the last ring that gives way.
+    let mut ring = vec![u32::MAX; vertices.len()];
+    for (i, p) in border.iter().enumerate() {
+        if let Some(p) = *p {
+            ring[i] = 0;
+            vertices[i] = p;
+        }
+    }
+    for step in 0..GIVE_WAY {
+        for &[a, b] in near {
+            if ring[a as usize] == step && ring[b as usize] == u32::MAX {
+                ring[b as usize] = step + 1;
+            }
+        }
+    }
+    let length = |a: u32, b: u32| exact[a as usize].position.distance(exact[b as usize].position);
+    let mean = near.iter().map(|&[a, b]| length(a, b)).sum::<f64>() / near.len().max(1) as f64;
+    // How much of its reach the movement of a border vertex has left where it comes to, the furthest reaching first.
+    let mut left = vec![0.0; vertices.len()];
+    let mut queue = BinaryHeap::new();
+    for (i, p) in exact.iter().enumerate() {
+        let reach = FOLLOW * p.position.distance(vertices[i].position);
+        if ring[i] == 0 && reach > f64::from(GIVE_WAY) * mean {
+            left[i] = reach;
+            queue.push((OrderedFloat(reach), Reverse(i as u32), i as u32));
+        }
+    }
+    while let Some((here, Reverse(i), from)) = queue.pop() {
+        if here.0 < left[i as usize] {
+            continue;
+        }
+        let start = near.partition_point(|pair| pair[0] < i);
+        for &[_, j] in near[start..].iter().take_while(|pair| pair[0] == i) {
+            let there = here.0 - length(i, j);
+            if ring[j as usize] == 0 || there <= left[j as usize] {
+                continue;
+            }
+            left[j as usize] = there;
+            let (old, new) = (exact[from as usize].position, vertices[from as usize].position);
+            let share = there / (FOLLOW * old.distance(new));
+            vertices[j as usize].position = exact[j as usize].position + share * (new - old);
+            queue.push((OrderedFloat(there), Reverse(j), from));
+        }
+    }
+    ring.iter()
+        .zip(left)
+        .map(|(&ring, left)| ring > 0 && (ring != u32::MAX || left > 0.0))
+        .collect()
 }
 
 /// The boundary of each sheet as chains of curves that share nodes, the longest first.

@@ -13,8 +13,9 @@
 //! Cost `O(n log n)`.
 
 use super::attributes;
+use super::breadth::depths;
 use super::contract::{contract, thickest};
-use super::corners::{cut_at_corners, straighten};
+use super::corners::{cut_at_corners, draw_straight, straighten};
 use super::dissolve::dissolve;
 use super::generators::generator_hosts;
 use super::hypergraph::{CoarseScaffold, Curve, CurveKind, FineLinks, MedialPoint, Node, NodeKind, Sheet};
@@ -81,12 +82,15 @@ pub fn coarse_scaffold(
                 .collect()
         })
         .collect();
+    let sheet_of_chain: Vec<Option<u32>> = sheets_of_chain.iter().map(|s| s.first().map(|s| s.0)).collect();
+    let depth_mm = depths_mm(fine, regularised, &chains, &sheet_of_chain, &sheet_of_facet);
     let mut lines = polylines(
         fine,
         regularised,
         &chains,
-        &sheets_of_chain,
+        &sheet_of_chain,
         &sheet_facets,
+        &depth_mm,
         &node_of_vertex,
         settings,
     );
@@ -97,20 +101,14 @@ pub fn coarse_scaffold(
         .collect();
     let ends: Vec<Option<[usize; 2]>> = chains.iter().map(|c| ends_of(c, &node_of_vertex)).collect();
     straighten(&network, &chains, &ends, &is_corner, &mut lines, &mut node_points);
-    for (chain, line) in chains.iter().zip(&mut lines) {
+    for ((chain, line), depth_mm) in chains.iter().zip(&mut lines).zip(&depth_mm) {
+        let ends = ends_of(chain, &node_of_vertex);
+        let tau = regularised.tolerance_over(&chain.vertices);
+        let width_mm = |k: usize| (settings.smoothing * tau).min(depth_mm[k].max(fine.scale.spacing_mm));
         if chain.kind == CurveKind::Rib {
-            pin(
-                line,
-                ends_of(chain, &node_of_vertex),
-                &node_points,
-                settings.contract_seam * regularised.tolerance_over(&chain.vertices),
-                settings.smoothing * regularised.tolerance_over(&chain.vertices),
-            );
+            pin(line, ends, &node_points, settings.contract_seam * tau, width_mm);
         }
-    }
-    for (chain, line) in chains.iter().zip(&mut lines) {
-        let width_mm = settings.smoothing * regularised.tolerance_over(&chain.vertices);
-        reach_nodes(line, ends_of(chain, &node_of_vertex), &node_points, width_mm);
+        reach_nodes(line, ends, &node_points, width_mm);
     }
     let mut border: BTreeMap<u32, MedialPoint> = BTreeMap::new();
     for (chain, line) in chains.iter().zip(&lines) {
@@ -217,13 +215,42 @@ fn seam_persistence(curves: &mut [Curve], nodes: &[Node]) {
     }
 }
 
+/// Change of depth along a rib, at most: what a point is smoothed over does not jump.
+const EVEN: f64 = 0.5;
+
+/// How far each point of each chain may be smoothed and moved, mm: by the depth of the sheet that it borders.
+fn depths_mm(
+    fine: &FineScaffold,
+    regularised: &Regularised,
+    chains: &[Chain],
+    sheet_of_chain: &[Option<u32>],
+    sheet_of_facet: &[u32],
+) -> Vec<Vec<f64>> {
+    let mut depths = depths(fine, regularised, chains, sheet_of_chain, sheet_of_facet);
+    for (chain, depth) in chains.iter().zip(&mut depths) {
+        for (depth, &v) in depth.iter_mut().zip(&chain.vertices) {
+            *depth *= regularised.tolerance_at(v);
+        }
+        let position = |k: usize| fine.vertex_position[chain.vertices[k] as usize];
+        let step = |k: usize| EVEN * position(k).distance(position(k - 1));
+        for k in 1..depth.len() {
+            depth[k] = depth[k].min(depth[k - 1] + step(k));
+        }
+        for k in (1..depth.len()).rev() {
+            depth[k - 1] = depth[k - 1].min(depth[k] + step(k));
+        }
+    }
+    depths
+}
+
 /// The chains as polylines, smoothed, ribs fitted as well.
 fn polylines(
     fine: &FineScaffold,
     regularised: &Regularised,
     chains: &[Chain],
-    sheets_of_chain: &[Vec<SheetId>],
+    sheet_of_chain: &[Option<u32>],
     sheet_facets: &[Vec<u32>],
+    depth_mm: &[Vec<f64>],
     node_of_vertex: &[u32],
     settings: &CoarseScaffoldSettings,
 ) -> Vec<Vec<MedialPoint>> {
@@ -250,15 +277,15 @@ fn polylines(
             line
         })
         .collect();
-    let sheet_of_chain: Vec<Option<u32>> = sheets_of_chain.iter().map(|s| s.first().map(|s| s.0)).collect();
     fit_ribs(
         fine,
         regularised,
         chains,
-        &sheet_of_chain,
+        sheet_of_chain,
         sheet_facets,
         &mut lines,
         &free,
+        depth_mm,
         settings.smoothing,
     );
     lines
@@ -348,7 +375,7 @@ fn pin(
     ends: Option<[usize; 2]>,
     nodes: &[MedialPoint],
     near_mm: f64,
-    width_mm: f64,
+    width_mm: impl Fn(usize) -> f64,
 ) {
     if let (Some([a, b]), [first, .., last]) = (ends, &mut *line) {
         for (end, node) in [(first, nodes[a]), (last, nodes[b])] {
@@ -356,18 +383,31 @@ fn pin(
                 *end = node;
             }
         }
-        attributes::smooth(line, false, width_mm);
+        attributes::smooth_by(line, false, width_mm);
     }
 }
 
+/// A line goes straight to its node from this many times as far as its end was away from it.
+const TURN: f64 = 2.0;
+
 /// Puts the ends of a line on its nodes and smooths it where they were not there.
-fn reach_nodes(line: &mut [MedialPoint], ends: Option<[usize; 2]>, nodes: &[MedialPoint], width_mm: f64) {
+fn reach_nodes(
+    line: &mut [MedialPoint],
+    ends: Option<[usize; 2]>,
+    nodes: &[MedialPoint],
+    width_mm: impl Fn(usize) -> f64,
+) {
     let (Some([a, b]), [first, .., last]) = (ends, &mut *line) else {
         return;
     };
+    let gaps =
+        [(*first, nodes[a]), (*last, nodes[b])].map(|(end, node)| end.position.distance(node.position));
     if *first != nodes[a] || *last != nodes[b] {
         (*first, *last) = (nodes[a], nodes[b]);
-        attributes::smooth(line, false, width_mm);
+        // A node on a fitted rib may lie beside the end or behind it: without turning back, the line goes straight to it.
+        draw_straight(line, true, TURN * gaps[0], nodes[a]);
+        draw_straight(line, false, TURN * gaps[1], nodes[b]);
+        attributes::smooth_by(line, false, width_mm);
     }
 }
 

@@ -4,11 +4,12 @@
 //!
 //! * [`hypergraph`]: the types that matching, measures and reports read;
 //! * [`build`]: [`coarse_scaffold`], the front function; `network` finds nodes, curves and sheets, `contract` makes
-//!   nodes of what is small, `hide` takes out what is below the cut, `dissolve` nodes where nothing ends, `ribs` fits the borders, `attributes`
+//!   nodes of what is small, `hide` takes out what is below the cut, `dissolve` nodes where nothing ends, `breadth` tells narrow strips, `ribs` fits the borders, `attributes`
 //!   measures, `generators` maps the surface to them, `natural` finds gaps in the persistences;
 //! * [`view`]: the graph at a coarser tolerance; [`levels`]: how many elements each of them has.
 
 mod attributes;
+mod breadth;
 pub mod build;
 mod contract;
 mod corners;

@@ -12,7 +12,8 @@
 //! 3. the point moves outward along the sheet to the zero of the fit, by no more than a bound, and not at all where the rib ends at
 //!    an axial curve in the thick of the scaffold;
 //! 4. the moved curve is smoothed again; its radius follows the slope of the radius along the way;
-//! 5. the border of each sheet's mesh is moved to the fitted ribs and the vertices near it are relaxed, so that the mesh has
+//! 5. where a sheet is a strip narrower than that ([`super::breadth`]), all of this goes no further than its depth;
+//! 6. the border of each sheet's mesh is moved to the fitted ribs and the vertices near it are relaxed, so that the mesh has
 //!    neither steps nor fingers. The exact complex is kept beside it ([`super::FineLinks`]).
 //!
 //! Cost: `O(rib points x neighbours)`.
@@ -32,6 +33,9 @@ use rayon::prelude::*;
 const POWERS: [f64; 3] = [1.0, 1.5, 2.0];
 /// Facets looked at are within this many spacings of the rib point.
 const REACH: f64 = 5.0;
+/// In a strip, within this share of its depth, since ET falls again over the middle, or this many spacings; and no point moves further.
+const WITHIN: f64 = 0.5;
+const REACH_NARROW: f64 = 3.0;
 /// Facets at least that are fitted.
 const FEWEST: usize = 8;
 /// Facets below this ET, in tolerances, say more of the sampling than of the shape.
@@ -60,7 +64,7 @@ struct Sample {
 }
 
 /// Smooths and fits the rib polylines of all chains; other chains are left as they are. `free[i]` tells loops without nodes;
-/// `width` is the width of other curves' smoothing in tolerances.
+/// `width` is the width of other curves' smoothing in tolerances; no point is smoothed or moved further than `depth_mm`, that of its sheet.
 pub(crate) fn fit_ribs(
     fine: &FineScaffold,
     regularised: &Regularised,
@@ -69,6 +73,7 @@ pub(crate) fn fit_ribs(
     sheet_facets: &[Vec<u32>],
     polylines: &mut [Vec<MedialPoint>],
     free: &[bool],
+    depth_mm: &[Vec<f64>],
     width: f64,
 ) {
     let LengthScale { spacing_mm, .. } = fine.scale;
@@ -89,15 +94,22 @@ pub(crate) fn fit_ribs(
             return;
         };
         let tau = regularised.tolerance_over(&chains[i].vertices);
-        let (reach, furthest) = ((REACH * spacing_mm).max(2.0 * tau), FURTHEST * tau);
-        let width_mm = RIB_WIDTH * width * tau;
+        let furthest = FURTHEST * tau;
+        let depth = &depth_mm[i];
+        let reach = |k: usize| {
+            let broad = (REACH * spacing_mm).max(2.0 * tau);
+            broad.min((WITHIN * depth[k]).max(REACH_NARROW * spacing_mm))
+        };
+        // The steps of polygons are smoothed away everywhere.
+        let width_mm = |k: usize| (RIB_WIDTH * width * tau).min(depth[k].max(spacing_mm));
         smooth_in_place(line, free[i], width_mm);
         let fade = fade(line, &chains[i].vertices, free[i], regularised);
         let (own, tree) = &samples[sheet as usize];
         let around: Vec<(Vec<Neighbour>, [DVec3; 2])> = line
             .iter()
-            .map(|q| {
-                let near = tree.within(q.position, reach);
+            .enumerate()
+            .map(|(k, q)| {
+                let near = tree.within(q.position, reach(k));
                 let tangents = tangents(own, &near);
                 (near, tangents)
             })
@@ -107,9 +119,10 @@ pub(crate) fn fit_ribs(
             .map(|&p| {
                 line.iter()
                     .zip(&around)
-                    .map(|(q, (near, tangents))| {
+                    .enumerate()
+                    .map(|(k, (q, (near, tangents)))| {
                         (near.len() >= FEWEST)
-                            .then(|| fit(own, near, *tangents, q.position, reach, p))
+                            .then(|| fit(own, near, *tangents, q.position, reach(k), p))
                             .flatten()
                     })
                     .collect()
@@ -119,8 +132,9 @@ pub(crate) fn fit_ribs(
         let Some(best) = fits.iter().min_by(|a, b| residual(a).total_cmp(&residual(b))) else {
             return;
         };
-        for ((q, f), fade) in line.iter_mut().zip(best).zip(&fade) {
+        for (((q, f), fade), depth) in line.iter_mut().zip(best).zip(&fade).zip(depth) {
             if let Some(f) = f {
+                let furthest = furthest.min(WITHIN * depth);
                 q.position += *fade * f.to_zero.clamp_length_max(furthest);
                 q.radius = (q.radius + fade * f.radius_slope * f.to_zero.length().min(furthest)).max(0.0);
             }
