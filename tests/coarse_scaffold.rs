@@ -628,3 +628,68 @@ fn a_winding_strip_keeps_its_ribs_on_its_borders_and_its_mesh_between_them() {
         );
     }
 }
+
+/// A round plate of radius 6 and thickness 0.4 with a tongue of width 0.7 that reaches out to 11.
+fn plate_with_tongue() -> datasets_synthetic::TriangleMesh {
+    let start = (0.35f64 / 6.0).asin();
+    let steps = 120;
+    let mut outline: Vec<[f64; 2]> = (0..=steps)
+        .map(|k| start + (std::f64::consts::TAU - 2.0 * start) * f64::from(k) / f64::from(steps))
+        .map(|a| [6.0 * a.cos(), 6.0 * a.sin()])
+        .collect();
+    outline.extend([[11.0, -0.35], [11.0, 0.35]]);
+    let n = outline.len() as u32;
+    let mut mesh = datasets_synthetic::TriangleMesh::default();
+    for z in [-0.2, 0.2] {
+        mesh.points
+            .extend(outline.iter().map(|p| DVec3::new(p[0], p[1], z)));
+        mesh.points.push(DVec3::new(0.0, 0.0, z));
+    }
+    for k in 0..n {
+        let (a, b) = (k, (k + 1) % n);
+        let (c, d) = (a + n + 1, b + n + 1);
+        mesh.triangles
+            .extend([[n, b, a], [2 * n + 1, c, d], [a, b, d], [a, d, c]]);
+    }
+    mesh
+}
+
+#[test]
+fn a_tongue_below_the_cut_stays_in_the_complex_and_is_not_shown() {
+    let plate = plate_with_tongue();
+    for seed in 1..=2 {
+        let points = datasets_synthetic::sample_poisson(&plate, 12_000, seed).points;
+        let fine = fine_of_mesh(&plate, points);
+        let settings = RegulariseSettings {
+            tolerance: Length::Millimetres(0.25),
+            ..RegulariseSettings::default()
+        };
+        let mut regularised = regularise(&fine, &settings).expect("topology is kept");
+        let alive = (0..fine.num_facets())
+            .filter(|&f| regularised.alive.facets[f])
+            .flat_map(|f| fine.facet_vertices(f))
+            .map(|&v| fine.vertex_position[v as usize].x)
+            .fold(0.0, f64::max);
+        assert!(alive > 10.0, "it is there up to {alive}");
+        // It stands for one tolerance and is shown; where the cut is above that, it is there for the surface only.
+        let shown = coarse_scaffold(&fine, &regularised, &CoarseScaffoldSettings::default());
+        assert_eq!(counts(&shown)[..2], [1, 0]);
+        let drawn = |s: &CoarseScaffold| {
+            let points = s.curves.iter().flat_map(|c| &c.polyline);
+            points.map(|p| p.position.x).fold(0.0, f64::max)
+        };
+        assert!(drawn(&shown) > 10.0);
+        regularised.cut = 2.0;
+        let s = coarse_scaffold(&fine, &regularised, &CoarseScaffoldSettings::default());
+        assert_eq!(counts(&s), [1, 0, 1, 0, 0]);
+        check_references(&s);
+        check_borders(&fine, &s);
+        assert!(drawn(&s) < 6.0 + 1.5 * s.tolerance_mm, "{}", drawn(&s));
+        // The rest of the rib is where the plate ends, less half its thickness.
+        for p in &s.curves[0].polyline {
+            let off = p.position.truncate().length() - 5.8;
+            assert!(off.abs() < 0.3 || p.position.x > 5.0, "{}", p.position);
+        }
+        assert!(s.fine.generator_host.iter().all(|h| *h != Host::Absent));
+    }
+}

@@ -246,20 +246,24 @@ fn mesh(fine: &FineScaffold, facets: &[u32], border: &BTreeMap<u32, MedialPoint>
     near.dedup();
     let on_border: Vec<Option<MedialPoint>> = used.iter().map(|v| border.get(v).copied()).collect();
     let free = give_way(&mut vertices, &near, &on_border);
+    let giving: Vec<&[[u32; 2]]> = near
+        .chunk_by(|x, y| x[0] == y[0])
+        .filter(|own| free[own[0][0] as usize])
+        .collect();
+    let mut next = Vec::with_capacity(giving.len());
     for _ in 0..RELAX {
-        let old = vertices.clone();
-        for own in near.chunk_by(|x, y| x[0] == y[0]) {
-            let i = own[0][0] as usize;
-            if !free[i] {
-                continue;
-            }
+        next.extend(giving.iter().map(|own| {
             let n = own.len() as f64;
-            let position: DVec3 = own.iter().map(|e| old[e[1] as usize].position).sum();
-            let radius: f64 = own.iter().map(|e| old[e[1] as usize].radius).sum();
-            vertices[i] = MedialPoint {
-                position: 0.5 * (old[i].position + position / n),
-                radius: 0.5 * (old[i].radius + radius / n),
-            };
+            let here = vertices[own[0][0] as usize];
+            let position: DVec3 = own.iter().map(|e| vertices[e[1] as usize].position).sum();
+            let radius: f64 = own.iter().map(|e| vertices[e[1] as usize].radius).sum();
+            MedialPoint {
+                position: 0.5 * (here.position + position / n),
+                radius: 0.5 * (here.radius + radius / n),
+            }
+        }));
+        for (own, next) in giving.iter().zip(next.drain(..)) {
+            vertices[own[0][0] as usize] = next;
         }
     }
     SheetMesh { vertices, triangles }
@@ -285,7 +289,8 @@ fn give_way(vertices: &mut [MedialPoint], near: &[[u32; 2]], border: &[Option<Me
         }
     }
     let length = |a: u32, b: u32| exact[a as usize].position.distance(exact[b as usize].position);
-    let mean = near.iter().map(|&[a, b]| length(a, b)).sum::<f64>() / near.len().max(1) as f64;
+    let at_border = || near.iter().filter(|pair| ring[pair[0] as usize] == 0);
+    let mean = at_border().map(|&[a, b]| length(a, b)).sum::<f64>() / at_border().count().max(1) as f64;
     // How much of its reach the movement of a border vertex has left where it comes to, the furthest reaching first.
     let mut left = vec![0.0; vertices.len()];
     let mut queue = BinaryHeap::new();

@@ -9,7 +9,7 @@
 //!    spikes too, which smoothing is for;
 //! 3. for the others the largest depth within [`BACK`].
 //!
-//! All lengths are in local tolerances, so that thick and thin parts are treated alike. Cost `O(n log n)` in the vertices within
+//! All lengths are in local tolerances, or in spacings where those are more, so that thick and thin parts are treated alike. Cost `O(n log n)` in the vertices within
 //! [`DEEP`] of a rib; for vertices of narrow strips the vertices within [`BACK`] each.
 
 use super::hypergraph::CurveKind;
@@ -26,13 +26,19 @@ const DEEP: f64 = 1.5;
 /// How far from a deep place a rib may be, in tolerances: spikes longer than the difference to [`DEEP`] are strips of their own.
 const BACK: f64 = 5.0;
 
-/// Depth of the sheet at each vertex of each chain, in local tolerances; infinite where it is broad, and for what is no rib.
+/// The unit of depths at a vertex, mm: the tolerance, or the spacing where that is more.
+pub(crate) fn unit_mm(fine: &FineScaffold, regularised: &Regularised, v: u32) -> f64 {
+    regularised.tolerance_at(v).max(fine.scale.spacing_mm)
+}
+
+/// Depth of the sheet at each vertex of each chain, in [`unit_mm`]; infinite where it is broad, and for what is no rib.
 pub(crate) fn depths(
     fine: &FineScaffold,
     regularised: &Regularised,
     chains: &[Chain],
     sheet_of_chain: &[Option<u32>],
     sheet_of_facet: &[u32],
+    strips: &mut Strips,
 ) -> Vec<Vec<f64>> {
     let mut ribs: Vec<Vec<usize>> = Vec::new();
     for (i, chain) in chains.iter().enumerate() {
@@ -51,22 +57,19 @@ pub(crate) fn depths(
         sheet_of_facet,
         sheet: NONE,
     };
-    let mut inward = Distances::new(fine.num_vertices());
-    let mut back = Distances::new(fine.num_vertices());
-    let mut around = Distances::new(fine.num_vertices());
+    let mut around: Option<Distances> = None;
     for (sheet, ribs) in ribs.iter().enumerate() {
         walk.sheet = sheet as u32;
         let border = ribs.iter().flat_map(|&i| chains[i].vertices.iter().copied());
-        inward.spread(&walk, border, DEEP);
-        let deep = |&v: &u32| inward.at[v as usize] >= DEEP;
-        back.spread(&walk, inward.reached.iter().copied().filter(deep), BACK);
+        strips.look(&walk, border, DEEP, BACK);
         for &i in ribs {
             for (k, &v) in chains[i].vertices.iter().enumerate() {
-                if back.at[v as usize] > BACK {
-                    around.spread(&walk, std::iter::once(v), BACK);
+                if strips.is_narrow(v) {
+                    let around = around.get_or_insert_with(|| Distances::new(fine.num_vertices()));
+                    around.spread(&walk, std::iter::once(v), BACK, |_| true);
                     let depth = |&u: &u32| {
                         if around.at[u as usize] <= BACK {
-                            inward.at[u as usize]
+                            strips.inward.at[u as usize]
                         } else {
                             0.0
                         }
@@ -79,12 +82,59 @@ pub(crate) fn depths(
     out
 }
 
-/// Where distances are measured: along the edges of one sheet, in local tolerances.
-struct Walk<'a> {
-    fine: &'a FineScaffold,
-    regularised: &'a Regularised,
-    sheet_of_facet: &'a [u32],
-    sheet: u32,
+/// Finds what is narrow of one sheet after the other.
+pub(crate) struct Strips {
+    deep: f64,
+    back_to: f64,
+    inward: Distances,
+    back: Distances,
+}
+
+impl Strips {
+    /// For so many vertices.
+    pub fn new(vertices: usize) -> Self {
+        Self {
+            deep: 0.0,
+            back_to: 0.0,
+            inward: Distances::new(vertices),
+            back: Distances::new(vertices),
+        }
+    }
+
+    /// Looks at the sheet that is walked on, from the vertices of its ribs: it is broad within `back_to` of where it is `deep` deep. Returns
+    /// whether it is so anywhere.
+    pub fn look(&mut self, walk: &Walk, border: impl Iterator<Item = u32>, deep: f64, back_to: f64) -> bool {
+        (self.deep, self.back_to) = (deep, back_to);
+        self.inward.spread(walk, border, self.deep, |_| true);
+        let deep = |&v: &u32| self.inward.at[v as usize] >= self.deep;
+        let deep = self.inward.reached.iter().copied().filter(deep);
+        let shallow = |v: u32| self.inward.at[v as usize] < self.deep;
+        self.back.spread(walk, deep, self.back_to, shallow);
+        !self.back.reached.is_empty()
+    }
+
+    /// Whether a vertex lies in a strip, if it is less than `deep` from a rib.
+    pub fn is_narrow(&self, v: u32) -> bool {
+        self.back.at[v as usize] > self.back_to
+    }
+
+    /// How far a vertex is from where the sheet is deep, up to `back_to`; infinite or more beyond.
+    pub fn distance_to_deep(&self, v: u32) -> f64 {
+        self.back.at[v as usize]
+    }
+
+    /// The vertices near the ribs.
+    pub fn near_ribs(&self) -> impl Iterator<Item = u32> + '_ {
+        self.inward.reached.iter().copied()
+    }
+}
+
+/// Where distances are measured: along the edges of one sheet, in [`unit_mm`].
+pub(super) struct Walk<'a> {
+    pub fine: &'a FineScaffold,
+    pub regularised: &'a Regularised,
+    pub sheet_of_facet: &'a [u32],
+    pub sheet: u32,
 }
 
 impl Walk<'_> {
@@ -102,7 +152,8 @@ impl Walk<'_> {
         fine.edges_of_vertex(v as usize).filter(on_sheet).map(move |e| {
             let u = fine.other_end(e as usize, v);
             let [a, b] = [u, v].map(|v| fine.vertex_position[v as usize]);
-            (u, a.distance(b) / regularised.tolerance_over(&[u, v]))
+            let unit = [u, v].map(|v| unit_mm(fine, regularised, v));
+            (u, a.distance(b) / (0.5 * (unit[0] + unit[1])))
         })
     }
 }
@@ -123,8 +174,15 @@ impl Distances {
         }
     }
 
-    /// Distances from some vertices. The first vertices beyond `limit` get theirs too, and nothing is looked for behind them.
-    fn spread(&mut self, walk: &Walk, from: impl Iterator<Item = u32>, limit: f64) {
+    /// Distances from some vertices over those that may be entered. The first vertices beyond `limit` get theirs too, and nothing is looked
+    /// for behind them.
+    fn spread(
+        &mut self,
+        walk: &Walk,
+        from: impl Iterator<Item = u32>,
+        limit: f64,
+        enter: impl Fn(u32) -> bool,
+    ) {
         for v in self.reached.drain(..) {
             self.at[v as usize] = f64::INFINITY;
         }
@@ -136,7 +194,9 @@ impl Distances {
                 continue;
             }
             for (u, step) in walk.neighbours(v) {
-                self.come(u, distance.0 + step);
+                if enter(u) {
+                    self.come(u, distance.0 + step);
+                }
             }
         }
     }

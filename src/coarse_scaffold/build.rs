@@ -6,14 +6,14 @@
 //! 2. persistence: of a sheet its largest erosion thickness (ET), of an axial curve the largest third-highest ET along it, of a
 //!    wire how far the surface moves without it ([`super::wires`]), of a rib that of its sheet, of a seam that of the axial curve it goes on from.
 //!    What cannot go without another topology (closed sheets, wires round a tunnel) gets the diagonal, and nothing else does;
-//! 3. [`super::ribs`]: ribs smoothed and fitted; attributes: polylines, lengths, areas, radii, moments, meshes;
+//! 3. [`super::tongues`]: what is narrow and below the cut is not shown; [`super::ribs`]: ribs smoothed and fitted; attributes: polylines, lengths, areas, radii, moments, meshes;
 //! 4. [`super::dissolve`]: nodes where only two ribs, or two pieces of one axial curve, are left go;
 //! 5. the generator map: the sheet that most of a generator's Voronoi facets by area belong to, else what holds the nearest ball.
 //!
 //! Cost `O(n log n)`.
 
 use super::attributes;
-use super::breadth::depths;
+use super::breadth::{Strips, depths, unit_mm};
 use super::contract::{contract, thickest};
 use super::corners::{cut_at_corners, draw_straight, straighten};
 use super::dissolve::dissolve;
@@ -23,6 +23,7 @@ use super::natural::natural_tolerances;
 use super::network::{Chain, Network};
 use super::ribs::fit_ribs;
 use super::settings::CoarseScaffoldSettings;
+use super::tongues::hide_tongues;
 use super::wires::wire_persistence;
 use crate::fine_scaffold::FineScaffold;
 use crate::fine_scaffold::complex::NONE;
@@ -43,6 +44,8 @@ pub fn coarse_scaffold(
     let mut network = Network::new(fine, regularised);
     let tau = regularised.tolerance_mm;
     contract(&mut network, settings);
+    let mut strips = Strips::new(fine.num_vertices());
+    let sheet_facets = hide_tongues(&mut network, &mut strips);
     cut_at_corners(&mut network);
     let node_vertices = network.nodes();
     let mut node_of_vertex = vec![NONE; fine.num_vertices()];
@@ -52,7 +55,6 @@ pub fn coarse_scaffold(
         }
     }
     let chains = network.chains();
-    let sheet_facets = network.sheets();
     let mut sheet_of_facet = vec![NONE; fine.num_facets()];
     for (i, facets) in sheet_facets.iter().enumerate() {
         for &f in facets {
@@ -83,7 +85,14 @@ pub fn coarse_scaffold(
         })
         .collect();
     let sheet_of_chain: Vec<Option<u32>> = sheets_of_chain.iter().map(|s| s.first().map(|s| s.0)).collect();
-    let depth_mm = depths_mm(fine, regularised, &chains, &sheet_of_chain, &sheet_of_facet);
+    let depth_mm = depths_mm(
+        fine,
+        regularised,
+        &chains,
+        &sheet_of_chain,
+        &sheet_of_facet,
+        &mut strips,
+    );
     let mut lines = polylines(
         fine,
         regularised,
@@ -225,11 +234,12 @@ fn depths_mm(
     chains: &[Chain],
     sheet_of_chain: &[Option<u32>],
     sheet_of_facet: &[u32],
+    strips: &mut Strips,
 ) -> Vec<Vec<f64>> {
-    let mut depths = depths(fine, regularised, chains, sheet_of_chain, sheet_of_facet);
+    let mut depths = depths(fine, regularised, chains, sheet_of_chain, sheet_of_facet, strips);
     for (chain, depth) in chains.iter().zip(&mut depths) {
         for (depth, &v) in depth.iter_mut().zip(&chain.vertices) {
-            *depth *= regularised.tolerance_at(v);
+            *depth *= unit_mm(fine, regularised, v);
         }
         let position = |k: usize| fine.vertex_position[chain.vertices[k] as usize];
         let step = |k: usize| EVEN * position(k).distance(position(k - 1));

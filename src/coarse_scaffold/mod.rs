@@ -4,7 +4,7 @@
 //!
 //! * [`hypergraph`]: the types that matching, measures and reports read;
 //! * [`build`]: [`coarse_scaffold`], the front function; `network` finds nodes, curves and sheets, `contract` makes
-//!   nodes of what is small, `hide` takes out what is below the cut, `dissolve` nodes where nothing ends, `breadth` tells narrow strips, `ribs` fits the borders, `attributes`
+//!   nodes of what is small, `hide` takes out what is below the cut, `dissolve` nodes where nothing ends, `tongues` takes out narrow ones, `breadth` tells strips, `ribs` fits the borders, `attributes`
 //!   measures, `generators` maps the surface to them, `natural` finds gaps in the persistences;
 //! * [`view`]: the graph at a coarser tolerance; [`levels`]: how many elements each of them has.
 
@@ -22,6 +22,7 @@ mod natural;
 mod network;
 pub mod ribs;
 pub mod settings;
+mod tongues;
 pub mod view;
 mod wires;
 

@@ -76,7 +76,7 @@ impl<'a> Network<'a> {
         }
     }
 
-    fn edge_alive(&self, e: u32) -> bool {
+    pub(super) fn edge_alive(&self, e: u32) -> bool {
         self.regularised.alive.edges[e as usize]
     }
 
