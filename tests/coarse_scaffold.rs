@@ -693,3 +693,26 @@ fn a_tongue_below_the_cut_stays_in_the_complex_and_is_not_shown() {
         assert!(s.fine.generator_host.iter().all(|h| *h != Host::Absent));
     }
 }
+
+#[test]
+fn ribs_on_both_sides_of_a_bridge_stay_where_they_are() {
+    // A disc with five round holes: between a hole and the border, erosion thickness rises to the middle of the bridge only.
+    let s = scaffold(&shapes::genus_five(), 10_000, 1);
+    assert_eq!(counts(&s), [1, 0, 6, 0, 0]);
+    let off = s.curves.iter().map(|rib| {
+        let points = || rib.polyline.iter().map(|p| p.position);
+        let n = rib.polyline.len() as f64;
+        let (low, high) = points().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| {
+            (l.min(p), h.max(p))
+        });
+        let centre = 0.5 * (low + high);
+        let radius = points().map(|p| p.distance(centre)).sum::<f64>() / n;
+        let square: f64 = points().map(|p| (p.distance(centre) - radius).powi(2)).sum();
+        (square / n).sqrt() / s.tolerance_mm
+    });
+    let off: Vec<f64> = off.collect();
+    assert!(
+        off.iter().all(|off| *off < 0.5),
+        "off circles by {off:?} tolerances"
+    );
+}

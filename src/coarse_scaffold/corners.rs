@@ -12,7 +12,7 @@
 //! How significant a corner is, is its angle times the length of its arms, against what the rib is off the pieces. The parabola's residual grows
 //! with the one, the pieces' is the other, so that the share says it, and it falls as the arms get longer where there is a corner,
 //! while it rises where a border merely bends. So a corner is one only if the share falls to [`CLEAR`] in that window or in one
-//! [`WIDER`] times as wide. Of corners within half a window the sharpest counts.
+//! [`WIDER`] times as wide, and the angle is the same in both: that of a bend, the end of an ellipse say, grows with the window. Of corners within half a window the sharpest counts.
 //!
 //! Measured: the corners of hexagonal plates, slabs and L-blocks leave 0.04 to 0.15 in the window and 0.02 to 0.08 in the wider one. On 16 tarsals with
 //! two seeds the least in either is 0.18 (a patella 0.20, at the same place with the other seed 0.23; a talus 0.18 with one seed, nothing below 0.27
@@ -41,6 +41,8 @@ const HAIRPIN: f64 = 0.8 * PI;
 const SHARE: f64 = 0.27;
 /// Largest share at a corner, in the window or in a wider one: between 0.08 and 0.18, see the module.
 const CLEAR: f64 = 0.12;
+/// Largest difference of the angles in both windows: that of a bend grows with the window.
+const STEADY: f64 = 0.05 * PI;
 /// The wider window in windows.
 const WIDER: f64 = 1.6;
 /// Width that positions are smoothed with, and twice that for arc lengths, in what counts as near.
@@ -158,8 +160,9 @@ impl Arc {
         if !(ANGLE..=HAIRPIN).contains(&angle) || share > SHARE {
             return None;
         }
-        let (_, wider) = self.compare(i, (WIDER * window).min(room), noise)?;
-        (share.min(wider) <= CLEAR).then_some(share)
+        let (wide_angle, wider) = self.compare(i, (WIDER * window).min(room), noise)?;
+        let steady = (wide_angle - angle).abs() <= STEADY;
+        (steady && share.min(wider) <= CLEAR).then_some(share)
     }
 
     /// Angle between two straight pieces that meet in a point, and the share of a parabola's square residual that they leave.

@@ -9,6 +9,7 @@
 //! 2. around each of its points `ET^(1/p)` of the sheet's facets is fitted by a linear function on the sheet's tangent plane, for `p` of 1, 1.5
 //!    and 2; the power that leaves the least residual over the whole rib is taken. (A linear function in space would do on a flat sheet only:
 //!    on a cone ET is exactly linear along the axis, and the rib would move along the axis, off the cone.)
+//!    Only facets up to where ET is highest count: beyond, on a bridge between two ribs, it falls again;
 //! 3. the point moves outward along the sheet to the zero of the fit, by no more than a bound, and not at all where the rib ends at
 //!    an axial curve in the thick of the scaffold;
 //! 4. the moved curve is smoothed again; its radius follows the slope of the radius along the way;
@@ -33,9 +34,12 @@ use rayon::prelude::*;
 const POWERS: [f64; 3] = [1.0, 1.5, 2.0];
 /// Facets looked at are within this many spacings of the rib point.
 const REACH: f64 = 5.0;
-/// In a strip, within this share of its depth, since ET falls again over the middle, or this many spacings; and no point moves further.
-const WITHIN: f64 = 0.5;
+/// And no further than to where ET is highest, since beyond it falls again towards another rib, but within this many spacings anyway.
 const REACH_NARROW: f64 = 3.0;
+/// High is this share of the highest ET in reach; on a sheet where it rises all the way, that is about as far off as this share of the reach.
+const HIGH: f64 = 0.9;
+/// In a strip no point moves further than this share of its depth.
+const WITHIN: f64 = 0.5;
 /// Facets at least that are fitted.
 const FEWEST: usize = 8;
 /// Facets below this ET, in tolerances, say more of the sampling than of the shape.
@@ -96,22 +100,20 @@ pub(crate) fn fit_ribs(
         let tau = regularised.tolerance_over(&chains[i].vertices);
         let furthest = FURTHEST * tau;
         let depth = &depth_mm[i];
-        let reach = |k: usize| {
-            let broad = (REACH * spacing_mm).max(2.0 * tau);
-            broad.min((WITHIN * depth[k]).max(REACH_NARROW * spacing_mm))
-        };
+        let broad = (REACH * spacing_mm).max(2.0 * tau);
         // The steps of polygons are smoothed away everywhere.
         let width_mm = |k: usize| (RIB_WIDTH * width * tau).min(depth[k].max(spacing_mm));
         smooth_in_place(line, free[i], width_mm);
         let fade = fade(line, &chains[i].vertices, free[i], regularised);
         let (own, tree) = &samples[sheet as usize];
-        let around: Vec<(Vec<Neighbour>, [DVec3; 2])> = line
+        let around: Vec<(f64, Vec<Neighbour>, [DVec3; 2])> = line
             .iter()
-            .enumerate()
-            .map(|(k, q)| {
-                let near = tree.within(q.position, reach(k));
+            .map(|q| {
+                let mut near = tree.within(q.position, broad);
+                let reach = up_to_ridge(own, &near, broad).max((REACH_NARROW * spacing_mm).min(broad));
+                near.truncate(near.partition_point(|n| n.distance2 <= reach * reach));
                 let tangents = tangents(own, &near);
-                (near, tangents)
+                (reach, near, tangents)
             })
             .collect();
         let fits: Vec<Vec<Option<Fit>>> = POWERS
@@ -119,10 +121,9 @@ pub(crate) fn fit_ribs(
             .map(|&p| {
                 line.iter()
                     .zip(&around)
-                    .enumerate()
-                    .map(|(k, (q, (near, tangents)))| {
+                    .map(|(q, (reach, near, tangents))| {
                         (near.len() >= FEWEST)
-                            .then(|| fit(own, near, *tangents, q.position, reach(k), p))
+                            .then(|| fit(own, near, *tangents, q.position, *reach, p))
                             .flatten()
                     })
                     .collect()
@@ -141,6 +142,14 @@ pub(crate) fn fit_ribs(
         }
         smooth_in_place(line, free[i], width_mm);
     });
+}
+
+/// How far ET rises from a point, mm, at most `reach`: on a bridge between two ribs it is half the bridge's width.
+fn up_to_ridge(samples: &[Sample], near: &[Neighbour], reach: f64) -> f64 {
+    let erosion = |n: &Neighbour| samples[n.index as usize].erosion;
+    let highest = near.iter().map(erosion).fold(0.0, f64::max);
+    let first = near.iter().find(|n| erosion(n) >= HIGH * highest);
+    first.map_or(reach, |n| (n.distance2.sqrt() / HIGH).min(reach))
 }
 
 /// How much of the fit counts at each point: 1 away from the ends and at thin ends, 0 at thick ones.
