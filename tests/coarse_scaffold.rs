@@ -346,6 +346,46 @@ fn in_a_view_an_axial_curve_goes_on_where_only_ribs_end_beside_it() {
 }
 
 /// A tube of radius 1 with flat ends.
+#[test]
+fn a_seam_parts_two_sheets_of_a_view_or_is_not_in_it() {
+    use CurveKind::{Axial, Rib, Seam};
+    // A curve 0-1-2 between sheets 0 and 1 with fins 2 and 3; at node 1 the seam of another curve meets it, which ends at node 3 and of
+    // which the fin is sheet 4. The seam parts sheet 0 from sheet 5.
+    let s = drawn(
+        6,
+        &[9.0, 8.0, 4.0, 3.0, 1.5, 7.0],
+        &[
+            (Axial, 4.0, [0, 1], &[0, 1, 2]),
+            (Axial, 3.0, [1, 2], &[5, 1, 2]),
+            (Seam, 1.5, [3, 1], &[0, 5]),
+            (Axial, 1.5, [3, 4], &[0, 5, 4]),
+            (Rib, 1.5, [3, 4], &[4]),
+            (Rib, 9.0, [4, 0], &[0]),
+        ],
+    );
+    let seams = |v: &CoarseScaffold| v.curves.iter().filter(|c| c.kind == Seam).count();
+    // While both are there the seam parts them; sheets 5 and 1 and 2 are beside the first curve on both sides of it, so it is one.
+    let fine = s.view(1.2);
+    check_references(&fine);
+    assert_eq!((seams(&fine), counts(&fine)[..2].to_vec()), (1, vec![6, 2]));
+    // Without the other curve sheets 0 and 5 are one, and nothing of the seam is left.
+    let coarse = s.view(2.0);
+    check_references(&coarse);
+    assert_eq!((seams(&coarse), counts(&coarse)[..2].to_vec()), (0, vec![4, 1]));
+
+    // A seam that stays, because its curve does, but has one sheet on both sides.
+    let idle = drawn(
+        4,
+        &[9.0, 8.0, 4.0],
+        &[
+            (Axial, 4.0, [0, 1], &[0, 1, 2]),
+            (Seam, 4.0, [1, 2], &[0, 0]),
+            (Rib, 9.0, [2, 0], &[0]),
+        ],
+    );
+    assert_eq!((seams(&idle), seams(&idle.view(2.0))), (1, 0));
+}
+
 fn flat_ended_tube(length: f64) -> (datasets_synthetic::TriangleMesh, Vec<DVec3>) {
     let mesh = shapes::grids::revolve(&[[0.0, 0.0], [1.0, 0.0], [1.0, length], [0.0, length]], 0.06);
     let points = datasets_synthetic::sample_poisson(&mesh, 12_000, 1).points;

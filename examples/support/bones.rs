@@ -12,6 +12,7 @@ use medial_scaffold::regularise::{Cost, RegulariseSettings};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
+use rayon::prelude::*;
 use std::error::Error;
 use std::path::PathBuf;
 
@@ -99,7 +100,7 @@ fn line(
         agreement.add(&a, &b);
         if verbose {
             let ([axial_a, sheets_a], [axial_b, sheets_b]) = (counts(&a.coarse), counts(&b.coarse));
-            let gap = gap_of(&[&a.coarse, &b.coarse], NEAR);
+            let gap = gap_of(&[&a.coarse, &b.coarse], 1.0, NEAR);
             let [at_a, at_b] = [&a, &b].map(|r| counts(&r.coarse.view(gap)));
             eprintln!(
                 "{:50} sheets {sheets_a:2} {sheets_b:2} axial {axial_a:2} {axial_b:2}, at {:.2} tolerances {} {} and {} {}, fidelity {:.2} {:.2}",
@@ -120,19 +121,26 @@ fn line(
 
 /// All pairs of six samplings of each bone: what single pairs scatter about.
 fn all_pairs(n: usize, settings: &RegulariseSettings) -> Result<(), Box<dyn Error>> {
-    let mut agreement = Agreement::default();
-    for file in bones() {
-        let mesh = read_mesh(&file)?;
+    let of_bone = |file: &PathBuf| -> Result<Agreement, String> {
+        let mesh = read_mesh(file).map_err(|e| e.to_string())?;
         let runs = (1..=6)
-            .map(|seed| run(&sample(&mesh, n, seed), &mesh, settings))
+            .map(|seed| run(&sample(&mesh, n, seed), &mesh, settings).map_err(|e| e.to_string()))
             .collect::<Result<Vec<Run>, _>>()?;
+        let mut agreement = Agreement::default();
         for (i, a) in runs.iter().enumerate() {
             for b in &runs[i + 1..] {
                 agreement.add(a, b);
             }
         }
+        Ok(agreement)
+    };
+    let bones = bones();
+    let each: Vec<Result<Agreement, String>> = bones.par_iter().with_max_len(1).map(of_bone).collect();
+    let mut all = Agreement::default();
+    for agreement in each {
+        all.merge(agreement?);
     }
-    agreement.print("all pairs of six samplings");
+    all.print("all pairs of six samplings");
     Ok(())
 }
 
@@ -189,7 +197,7 @@ fn mirrored(n: usize, settings: &RegulariseSettings) -> Result<(), Box<dyn Error
         let rms = share * (rms_distance(&target, &source) + rms_distance(&source, &target));
         let medial = |a, b| share * (medial_distance(a, b) + medial_distance(b, a));
         let all = medial(&a.coarse, &b.coarse);
-        let gap = gap_of(&[&a.coarse, &b.coarse], NEAR);
+        let gap = gap_of(&[&a.coarse, &b.coarse], 1.0, NEAR);
         let seen = medial(&a.coarse.view(gap), &b.coarse.view(gap));
         let own = [all / rms, all / mean, seen / rms, seen / mean];
         let ([axial_a, sheets_a], [axial_b, sheets_b]) = (counts(&a.coarse), counts(&b.coarse));

@@ -6,15 +6,17 @@ use medial_scaffold::geometry::closest::ClosestOnMesh;
 use medial_scaffold::geometry::{Neighbours, TriangleMesh};
 
 /// Heading of the lines that [`Agreement::print`] writes.
-pub const HEADING: &str = "| variant | shapes | sheets change | axial change | the same over views of 1 to 2.5 tolerances | curves re-found | persistence change | same axial / all counts at the gap of the first | at the gap of both | the same up to 3 tolerances | medial distance %D | fidelity median / max (tau) | Betti = surface's |
-|---|---|---|---|---|---|---|---|---|---|---|---|---|";
+pub const HEADING: &str = "| variant | pairs | sheets change | axial change | axial, sheets % change in views of 1.25, 1.5, 2 and 2.5 tolerances | curves re-found | persistence change | same axial / all counts at the gap of the first | at the gap of both | of both, up to 3 tolerances | of both, about 2 tolerances | medial distance %D | fidelity median / max (tau) | Betti = surface's |
+|---|---|---|---|---|---|---|---|---|---|---|---|---|---|";
 
 /// A gap is looked for up to this many tolerances.
 pub const NEAR: f64 = 1.8;
 const FAR: f64 = 3.0;
+/// A tolerance of two is moved by up to this factor.
+const MOVED: f64 = 1.35;
 
-/// Views that counts are compared over, in tolerances.
-const VIEWS: [f64; 9] = [1.0, 1.12, 1.26, 1.41, 1.58, 1.78, 2.0, 2.24, 2.5];
+/// Views that counts are compared in, in tolerances.
+const VIEWS: [f64; 4] = [1.25, 1.5, 2.0, 2.5];
 
 /// Means over pairs of scaffolds.
 #[derive(Default)]
@@ -22,14 +24,14 @@ pub struct Agreement {
     pub shapes: usize,
     sheets: f64,
     axial: f64,
-    sheets_over_views: f64,
-    axial_over_views: f64,
+    /// Axial curves and sheets in each of the views.
+    in_views: [[f64; 2]; VIEWS.len()],
     kept: usize,
     found: usize,
     log_ratios: Vec<f64>,
-    /// At the gap of the first, at that of both, and at that of both when it may be wider: pairs with as many axial curves, and with as
-    /// many sheets too.
-    same: [[usize; 2]; 3],
+    /// At the gap of the first, at that of both, at that of both when it may be wider, and about two tolerances: pairs with as many
+    /// axial curves, and with as many sheets too.
+    same: [[usize; 2]; 4],
     medial: f64,
     fidelity: Vec<f64>,
     betti: usize,
@@ -59,10 +61,11 @@ impl Agreement {
         self.sheets += change(sheets_a, sheets_b);
         self.axial += change(axial_a, axial_b);
         let tau = a.coarse.tolerance_mm;
-        for t in VIEWS {
+        for (t, sums) in VIEWS.into_iter().zip(&mut self.in_views) {
             let [x, y] = [&a.coarse, &b.coarse].map(|s| counts(&s.view(t * tau)));
-            self.axial_over_views += change(x[0], y[0]) / VIEWS.len() as f64;
-            self.sheets_over_views += change(x[1], y[1]) / VIEWS.len() as f64;
+            for (sum, k) in sums.iter_mut().zip(0..) {
+                *sum += change(x[k], y[k]);
+            }
         }
         for curve in axial(&a.coarse).filter(|c| c.persistence >= 1.5 * tau) {
             self.kept += 1;
@@ -72,7 +75,12 @@ impl Agreement {
             }
         }
         let both = [&a.coarse, &b.coarse];
-        let gaps = [gap_of(&both[..1], NEAR), gap_of(&both, NEAR), gap_of(&both, FAR)];
+        let gaps = [
+            gap_of(&both[..1], 1.0, NEAR),
+            gap_of(&both, 1.0, NEAR),
+            gap_of(&both, 1.0, FAR),
+            gap_of(&both, 2.0 / MOVED, 2.0 * MOVED),
+        ];
         for (gap, same) in gaps.into_iter().zip(&mut self.same) {
             let [x, y] = [&a.coarse, &b.coarse].map(|s| counts(&s.view(gap)));
             same[0] += usize::from(x[0] == y[0]);
@@ -87,6 +95,29 @@ impl Agreement {
         }
     }
 
+    /// Adds the pairs of another.
+    pub fn merge(&mut self, other: Agreement) {
+        self.shapes += other.shapes;
+        self.sheets += other.sheets;
+        self.axial += other.axial;
+        self.kept += other.kept;
+        self.found += other.found;
+        self.log_ratios.extend(other.log_ratios);
+        for (sums, more) in self.in_views.iter_mut().zip(other.in_views) {
+            for (sum, x) in sums.iter_mut().zip(more) {
+                *sum += x;
+            }
+        }
+        for (sums, more) in self.same.iter_mut().zip(other.same) {
+            for (sum, x) in sums.iter_mut().zip(more) {
+                *sum += x;
+            }
+        }
+        self.medial += other.medial;
+        self.fidelity.extend(other.fidelity);
+        self.betti += other.betti;
+    }
+
     /// Prints the means as a line of a table.
     pub fn print(mut self, name: &str) {
         let n = self.shapes.max(1) as f64;
@@ -96,13 +127,17 @@ impl Agreement {
             v.sort_by(f64::total_cmp);
             v.get(v.len() / 2).copied().unwrap_or(0.0)
         };
+        let views: Vec<String> = self
+            .in_views
+            .iter()
+            .map(|v| format!("{:.1}, {:.1}", 100.0 * v[0] / n, 100.0 * v[1] / n))
+            .collect();
         println!(
-            "| {name} | {} | {} | {} | {}, {} | {}/{} | {} | {} / {} % | {} / {} % | {} / {} % | {:.2} | {:.2} / {:.2} | {}/{} |",
+            "| {name} | {} | {} | {} | {} | {}/{} | {} | {} / {} % | {} / {} % | {} / {} % | {} / {} % | {:.2} | {:.2} / {:.2} | {}/{} |",
             self.shapes,
             percent(self.sheets / n),
             percent(self.axial / n),
-            percent(self.sheets_over_views / n),
-            percent(self.axial_over_views / n),
+            views.join("; "),
             self.found,
             self.kept,
             percent(median(&mut self.log_ratios)),
@@ -112,6 +147,8 @@ impl Agreement {
             share(self.same[1][1]),
             share(self.same[2][0]),
             share(self.same[2][1]),
+            share(self.same[3][0]),
+            share(self.same[3][1]),
             self.medial / n,
             median(&mut self.fidelity),
             self.fidelity.last().copied().unwrap_or(0.0),
@@ -141,10 +178,10 @@ pub fn distance_along(curve: &Curve, other: &Curve) -> f64 {
     sum / curve.polyline.len() as f64
 }
 
-/// The middle of the widest gap that the persistences of some scaffolds leave between one tolerance and `most`.
-pub fn gap_of(scaffolds: &[&CoarseScaffold], most: f64) -> f64 {
+/// The middle of the widest gap that the persistences of some scaffolds leave between `least` and `most` tolerances.
+pub fn gap_of(scaffolds: &[&CoarseScaffold], least: f64, most: f64) -> f64 {
     let tau = scaffolds[0].tolerance_mm;
-    let (lo, hi) = (tau, most * tau);
+    let (lo, hi) = (least * tau, most * tau);
     let mut p: Vec<f64> = scaffolds
         .iter()
         .flat_map(|s| axial(s))

@@ -115,7 +115,7 @@ pub fn coarse_scaffold(
         let tau = regularised.tolerance_over(&chain.vertices);
         let width_mm = |k: usize| (settings.smoothing * tau).min(depth_mm[k].max(fine.scale.spacing_mm));
         if chain.kind == CurveKind::Rib {
-            pin(line, ends, &node_points, settings.contract_seam * tau, width_mm);
+            pin(line, ends, &node_points, settings.near_end * tau, width_mm);
         }
         reach_nodes(line, ends, &node_points, width_mm);
     }
@@ -202,11 +202,10 @@ fn left(
 }
 
 fn axial_persistence(network: &Network, chain: &Chain) -> f64 {
-    let persistence = |&e: &u32| {
+    network.along(&chain.edges, |e| {
         let ends = &network.fine.edge_vertices[e as usize];
         network.regularised.persistence(network.third_erosion(e), ends)
-    };
-    chain.edges.iter().map(persistence).fold(0.0, f64::max)
+    })
 }
 
 fn seam_persistence(curves: &mut [Curve], nodes: &[Node]) {

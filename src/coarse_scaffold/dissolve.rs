@@ -138,11 +138,13 @@ fn join(
     }
 }
 
-/// Joins axial curves that go on through a node where only ribs end beside them: two that share two sheets at least. What ends there
+/// Joins axial curves that go on through a node where only ribs and seams end beside them: two that share two sheets at least. A seam
+/// that meets a curve from the side does not make it two. What ends there
 /// beside them hung on something that is not shown, or the third sheet of each, a fin, stops short of the node: A1A3 ends that face each
 /// other and that a seam made one (merge A1A3-II). In the next sampling the curve runs through. The fins stay two sheets, both
 /// named by the joined curve; the ribs keep the node.
 pub(crate) fn join_facing(curves: &mut Vec<Curve>, nodes: usize) {
+    let mut edges = vec![Vec::new(); curves.len()];
     let mut at: Vec<Vec<usize>> = vec![Vec::new(); nodes];
     for (i, c) in curves.iter().enumerate() {
         for n in &c.nodes {
@@ -158,13 +160,12 @@ pub(crate) fn join_facing(curves: &mut Vec<Curve>, nodes: usize) {
             .collect();
         let &[a, b] = axial.as_slice() else { return false };
         own.iter()
-            .all(|&c| matches!(kind(c), CurveKind::Axial | CurveKind::Rib))
+            .all(|&c| matches!(kind(c), CurveKind::Axial | CurveKind::Rib | CurveKind::Seam))
             && a != b
             && shared(&curves[a].sheets, &curves[b].sheets) >= 2
     };
     let places: Vec<usize> = (0..nodes).filter(|&n| goes_on(&at[n])).collect();
     let mut gone = vec![false; curves.len()];
-    let mut edges = vec![Vec::new(); curves.len()];
     for n in places {
         let axial: Vec<usize> = at[n]
             .iter()

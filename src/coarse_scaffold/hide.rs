@@ -4,7 +4,7 @@
 //! otherwise come and go with the sampling.
 //!
 //! 1. the spines of the regularisation;
-//! 2. whiskers: wires with a free tip that hang on a sheet and are no longer than one and a half seams;
+//! 2. whiskers: wires with a free tip that hang on a sheet and are no longer than one and a half of the longest seams;
 //! 3. axial curves of less persistence than the cut, the least persistent first. The sheets along a curve that is hidden are one
 //!    sheet, and the curves on both sides of its ends become one where nothing else ends there, with the larger persistence;
 //! 4. flaps: the fin that such a curve carried, where it hangs on nothing else and all of it is below the cut.
@@ -33,7 +33,7 @@ pub(crate) fn hide(network: &mut Network, settings: &CoarseScaffoldSettings) {
         let whiskers: Vec<Chain> = network
             .chains()
             .into_iter()
-            .filter(|c| is_whisker(network, c, settings.contract_seam))
+            .filter(|c| is_whisker(network, c, settings.near_end))
             .collect();
         if whiskers.is_empty() {
             break;
@@ -230,13 +230,13 @@ fn hide_chain(network: &mut Network, chain: &Chain) {
     }
 }
 
-/// Largest third-highest erosion thickness along an axial curve, in tolerances.
+/// Third-highest erosion thickness along the persistence length of an axial curve, in tolerances.
 fn relative_persistence(network: &Network, chain: &Chain) -> f64 {
-    let value = |&e: &u32| {
+    let value = |e: u32| {
         let ends = &network.fine.edge_vertices[e as usize];
         network.third_erosion(e) / network.regularised.tolerance_over(ends)
     };
-    chain.edges.iter().map(value).fold(0.0, f64::max)
+    network.along(&chain.edges, value)
 }
 
 /// Whether a chain is a short wire from a tip to a sheet.

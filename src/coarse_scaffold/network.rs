@@ -13,6 +13,7 @@ use super::hypergraph::CurveKind;
 use crate::fine_scaffold::FineScaffold;
 use crate::fine_scaffold::complex::NONE;
 use crate::geometry::mesh::DisjointSets;
+use crate::regularise::fins::{Along, lasting};
 use crate::regularise::{Event, Regularised};
 use std::collections::BTreeMap;
 
@@ -105,6 +106,18 @@ impl<'a> Network<'a> {
         self.facets(e)
             .map(|f| self.regularised.erosion_mm[f as usize])
             .fold(f64::INFINITY, f64::min)
+    }
+
+    /// What a value of the edges of a curve is along the persistence length of the regularisation.
+    pub fn along(&self, edges: &[u32], value: impl Fn(u32) -> f64) -> f64 {
+        let values: Vec<Along> = edges
+            .iter()
+            .map(|&e| Along {
+                value: value(e),
+                length: self.length(&[e]),
+            })
+            .collect();
+        lasting(values, self.regularised.persistence_length_mm)
     }
 
     /// The edge of largest third-highest erosion thickness of a chain, the first of equals.

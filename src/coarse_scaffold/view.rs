@@ -8,8 +8,9 @@
 //! 2. axial curves, wires and seams below it go; of the three sheets at an axial curve that went, the two of highest erosion thickness become
 //!    one and the third is one with them only where nothing else holds it; what a sheet that went stood for (volume, generators)
 //!    falls to the sheet it hung on by its most persistent curve;
-//! 3. nodes that no curve ends at go; where just two curves of one kind are left, they become one; so do two axial curves of two
-//!    shared sheets where only ribs end beside them: whether a curve runs through there or in two pieces is decided below the
+//! 3. seams with one sheet on both sides go: they part nothing any more;
+//! 4. nodes that no curve ends at go; where just two curves of one kind are left, they become one; so do two axial curves of two
+//!    shared sheets where only ribs and seams end beside them: whether a curve runs through there or in two pieces is decided below the
 //!    tolerance of a view, and differs from sampling to sampling.
 //!
 //! Cost: `O(elements log elements)`.
@@ -38,7 +39,7 @@ impl CoarseScaffold {
             .curves
             .iter()
             .zip(&keep_curve)
-            .filter(|(_, keep)| **keep)
+            .filter(|(c, keep)| **keep && !is_idle(c, &sheet_of))
             .map(|(c, _)| Curve {
                 sheets: c
                     .sheets
@@ -246,6 +247,13 @@ impl CoarseScaffold {
         }
         (sheets, number)
     }
+}
+
+/// Whether a curve is a seam with one sheet on both sides: it parts nothing.
+fn is_idle(curve: &Curve, sheet_of: &[Option<u32>]) -> bool {
+    let mut sides = curve.sheets.iter().map(|s| sheet_of[s.index()]);
+    let first = sides.next();
+    curve.kind == CurveKind::Seam && sides.all(|s| Some(s) == first)
 }
 
 /// Several sheets as one: sums, weighted means and moments.

@@ -19,8 +19,32 @@ use std::collections::BTreeMap;
 #[derive(Clone, Debug)]
 pub(crate) struct AxialChain {
     pub edges: Vec<u32>,
-    /// Maximum along the chain of the third-highest value at an edge.
+    /// What the third-highest value at an edge is along the persistence length; see [`lasting`].
     pub persistence: f64,
+}
+
+/// A value at a piece of a curve.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Along {
+    pub value: f64,
+    /// Length of the piece, mm.
+    pub length: f64,
+}
+
+/// The largest value that pieces of `length_mm` in all reach, or half of the curve where that is less: a quantile by length, so that
+/// no single edge decides. The maximum when the length is 0; 0 of nothing.
+pub(crate) fn lasting(mut pieces: Vec<Along>, length_mm: f64) -> f64 {
+    pieces.sort_unstable_by(|a, b| b.value.total_cmp(&a.value).then(a.length.total_cmp(&b.length)));
+    let whole: f64 = pieces.iter().map(|p| p.length).sum();
+    let wanted = length_mm.min(0.5 * whole);
+    let mut walked = 0.0;
+    for piece in pieces {
+        walked += piece.length;
+        if walked >= wanted {
+            return piece.value;
+        }
+    }
+    0.0
 }
 
 /// Number of alive axial edges at each vertex.
@@ -46,7 +70,7 @@ fn lowest(complex: &Complex, values: &[f64], edge: u32) -> (u32, f64) {
 }
 
 /// The axial chains with their persistence in the unit of `values`, in order of their smallest edge.
-pub(crate) fn axial_chains(complex: &Complex, values: &[f64]) -> Vec<AxialChain> {
+pub(crate) fn axial_chains(complex: &Complex, values: &[f64], length_mm: f64) -> Vec<AxialChain> {
     let degree = axial_degree(complex);
     let edges: Vec<u32> = (0..complex.fine.num_edges() as u32)
         .filter(|&e| complex.edge_alive[e as usize] && complex.edge_count[e as usize] >= 3)
@@ -65,17 +89,25 @@ pub(crate) fn axial_chains(complex: &Complex, values: &[f64]) -> Vec<AxialChain>
             }
         }
     }
-    let mut chains: BTreeMap<u32, AxialChain> = BTreeMap::new();
+    let mut chains: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for (i, &e) in edges.iter().enumerate() {
-        let chain = chains.entry(sets.find(i as u32)).or_insert(AxialChain {
-            edges: Vec::new(),
-            persistence: f64::NEG_INFINITY,
-        });
-        chain.edges.push(e);
-        // Triangles have three edges, so at most three facets meet at an edge: the third-highest is the lowest.
-        chain.persistence = chain.persistence.max(lowest(complex, values, e).1);
+        chains.entry(sets.find(i as u32)).or_default().push(e);
     }
-    chains.into_values().collect()
+    let piece = |&e: &u32| {
+        let [a, b] = complex.fine.edge_vertices[e as usize].map(|v| complex.fine.vertex_position[v as usize]);
+        Along {
+            // Triangles have three edges, so at most three facets meet at an edge: the third-highest is the lowest.
+            value: lowest(complex, values, e).1,
+            length: a.distance(b),
+        }
+    };
+    chains
+        .into_values()
+        .map(|edges| AxialChain {
+            persistence: lasting(edges.iter().map(piece).collect(), length_mm),
+            edges,
+        })
+        .collect()
 }
 
 /// Trims the fins of all axial chains of persistence below `limit` tolerances. Returns the number of chains that went.
@@ -84,12 +116,13 @@ pub(crate) fn trim_fins(
     measure: &Measure,
     relative: &[f64],
     limit: f64,
+    length_mm: f64,
     wire: f64,
     fire: &mut WireFire,
     cover: &mut Cover,
     history: &mut Vec<Event>,
 ) -> usize {
-    let mut chains = axial_chains(complex, relative);
+    let mut chains = axial_chains(complex, relative, length_mm);
     chains.retain(|c| c.persistence < limit);
     chains.sort_by(|a, b| {
         a.persistence
@@ -280,5 +313,30 @@ impl Flood {
             }
         }
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pieces(list: &[(f64, f64)]) -> Vec<Along> {
+        list.iter()
+            .map(|&(value, length)| Along { value, length })
+            .collect()
+    }
+
+    #[test]
+    fn what_lasts_is_not_what_one_edge_has() {
+        // A curve of length 10 that is 1 all along, with a last edge of length 0.2 at a node that is 9.
+        let mut curve = vec![(1.0, 0.5); 20];
+        curve.push((9.0, 0.2));
+        assert_eq!(lasting(pieces(&curve), 0.0), 9.0);
+        assert_eq!(lasting(pieces(&curve), 0.2), 9.0);
+        assert_eq!(lasting(pieces(&curve), 1.0), 1.0);
+        // Of a curve shorter than twice the length it is the median; the order along the curve does not matter.
+        assert_eq!(lasting(pieces(&[(3.0, 0.1), (1.0, 0.1), (2.0, 0.1)]), 1.0), 2.0);
+        assert_eq!(lasting(pieces(&[(5.0, 0.3)]), 1.0), 5.0);
+        assert_eq!(lasting(Vec::new(), 1.0), 0.0);
     }
 }
