@@ -99,6 +99,11 @@ fn line(
         let b = again(&mesh, n, second, settings, &a)?;
         agreement.add(&a, &b);
         if verbose {
+            for r in [&a, &b] {
+                if r.known.is_some_and(|known| known != r.solid) {
+                    eprintln!("Betti numbers {:?}, the surface's {:?}", r.solid, r.known);
+                }
+            }
             let ([axial_a, sheets_a], [axial_b, sheets_b]) = (counts(&a.coarse), counts(&b.coarse));
             let gap = gap_of(&[&a.coarse, &b.coarse], 1.0, NEAR);
             let [at_a, at_b] = [&a, &b].map(|r| counts(&r.coarse.view(gap)));

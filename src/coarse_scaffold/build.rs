@@ -3,7 +3,7 @@
 //! In: the fine scaffold and its regularisation. Out: [`CoarseScaffold`].
 //!
 //! 1. [`super::network`]: nodes, chains and sheets;
-//! 2. persistence: of a sheet its largest erosion thickness (ET), of an axial curve the largest third-highest ET along it, of a
+//! 2. persistence: of a sheet its largest erosion thickness (ET), of an axial curve the third-highest ET along a length, of a
 //!    wire how far the surface moves without it ([`super::wires`]), of a rib that of its sheet, of a seam that of the axial curve it goes on from.
 //!    What cannot go without another topology (closed sheets, wires round a tunnel) gets the diagonal, and nothing else does;
 //! 3. [`super::tongues`]: what is narrow and below the cut is not shown; [`super::ribs`]: ribs smoothed and fitted; attributes: polylines, lengths, areas, radii, moments, meshes;

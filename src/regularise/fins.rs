@@ -1,7 +1,8 @@
 //! Step 4b: fins are trimmed by hysteresis.
 //!
 //! An axial curve exists because three sheets meet; the third-highest erosion thickness at an edge says how far the lowest of
-//! them goes, and its maximum along a curve is the curve's *persistence*. The lowest sheet of a curve of too little persistence
+//! them goes, and what it is along a given length of a curve ([`lasting`]) is the curve's *persistence*: its maximum is too often that of a
+//! single facet at a node, and jumps by a factor of two between samplings. The lowest sheet of a curve of too little persistence
 //! is a fin. It cannot be spliced when it runs into its neighbours round the end of the curve; so it is flooded from the
 //! curve outward, through facets of small ET only, just as far as is needed to collapse it away.
 
