@@ -4,8 +4,9 @@
 //!
 //! * [`hypergraph`]: the types that matching, measures and reports read;
 //! * [`build`]: [`coarse_scaffold`], the front function; `network` finds nodes, curves and sheets, `contract` makes
-//!   nodes of what is small, `hide` takes out what is below the cut, `dissolve` nodes where nothing ends, `tongues` takes out narrow ones, `breadth` tells strips, `ribs` fits the borders, `attributes`
-//!   measures, `generators` maps the surface to them, `natural` finds gaps in the persistences;
+//!   nodes of what is small, `hide` and `tongues` take out what is below the cut, `corners` cuts ribs, `dissolve` takes out nodes where
+//!   nothing ends, `ribs` fits the borders, `breadth` tells it where a sheet is but a strip, `attributes` measures, `wires` grades
+//!   wires, `generators` maps the surface to all of them, `natural` finds gaps in the persistences;
 //! * [`view`]: the graph at a coarser tolerance; [`levels`]: how many elements each of them has.
 
 mod attributes;
