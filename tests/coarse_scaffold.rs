@@ -5,7 +5,9 @@ mod coarse_support;
 use coarse_support::{check_references, counts, fine_of, fine_of_mesh, scaffold, scaffold_at, scaffold_of};
 use datasets_synthetic::shapes;
 use glam::DVec3;
-use medial_scaffold::coarse_scaffold::{CoarseScaffoldSettings, CurveKind, Host, NodeKind, coarse_scaffold};
+use medial_scaffold::coarse_scaffold::{
+    CoarseScaffoldSettings, Curve, CurveKind, Host, NodeKind, coarse_scaffold,
+};
 use medial_scaffold::geometry::Length;
 use medial_scaffold::regularise::{RegulariseSettings, regularise, replay};
 
@@ -168,6 +170,34 @@ fn a_tolerance_relative_to_the_radius_is_relative_to_the_tube_and_not_to_the_edg
     let view = y.view(0.9 * y.diagonal_mm);
     assert_eq!(counts(&view)[3], 1);
     check_references(&view);
+}
+
+#[test]
+fn with_a_tolerance_relative_to_the_radius_thick_and_thin_parts_are_graded_alike() {
+    // A box and the same box at two fifths of its size, with the same points: what is along a length is so in the tolerance of each.
+    let shape = shapes::box_shape(1.0, 1.4, 2.0);
+    let small = |p: DVec3| 0.4 * p + DVec3::X * 5.0;
+    let mut mesh = shape.mesh(5_000);
+    let offset = mesh.points.len() as u32;
+    mesh.points.extend(mesh.points.clone().into_iter().map(small));
+    mesh.triangles
+        .extend(mesh.triangles.clone().into_iter().map(|t| t.map(|i| i + offset)));
+    let mut points = shape.sample_poisson(8_000, 3).points;
+    points.extend(points.clone().into_iter().map(small));
+    let s = scaffold_of(fine_of_mesh(&mesh, points), Length::LocalRadii(0.25));
+    let axial = |small: bool| -> Vec<f64> {
+        let here = |c: &&Curve| (c.polyline[0].position.x > 3.0) == small;
+        let axial = s.curves.iter().filter(|c| c.kind == CurveKind::Axial);
+        let mut own: Vec<f64> = axial.filter(here).map(|c| c.persistence).collect();
+        own.sort_by(f64::total_cmp);
+        own
+    };
+    let (thick, thin) = (axial(false), axial(true));
+    assert!(!thick.is_empty());
+    assert_eq!(thick.len(), thin.len(), "{thick:?} {thin:?}");
+    for (a, b) in thick.iter().zip(&thin) {
+        assert!((a / b - 1.0).abs() < 0.02, "{thick:?} {thin:?}");
+    }
 }
 
 #[test]

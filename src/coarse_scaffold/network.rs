@@ -114,10 +114,13 @@ impl<'a> Network<'a> {
             .iter()
             .map(|&e| Along {
                 value: value(e),
-                length: self.length(&[e]),
+                length: self.length(&[e])
+                    / self
+                        .regularised
+                        .tolerance_over(&self.fine.edge_vertices[e as usize]),
             })
             .collect();
-        lasting(values, self.regularised.persistence_length_mm)
+        lasting(values, self.regularised.persistence_length)
     }
 
     /// The edge of largest third-highest erosion thickness of a chain, the first of equals.

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub struct CoarseScaffoldSettings {
     /// Seams up to this long (or three spacings, below which there is only sampling) are shrunk to a node, so that the axial curve ends
     /// on the rib (merge A1A5). Longer ones stay curves: where a view hides the axial curve, what its seam parted is one
-    /// sheet again, which a node cannot tell. Between samplings of 25 bones sheets change by 15 % in views with 1, by
+    /// sheet again, which a node cannot tell. Between samplings of 25 bones sheets change by 16 % in views with 1, by
     /// 20 % with 4.5.
     pub contract_seam: f64,
     /// How far from the rib it would have met an axial curve may end, the longest seam of the regularisation: ribs are drawn to nodes

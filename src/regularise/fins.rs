@@ -28,16 +28,16 @@ pub(crate) struct AxialChain {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Along {
     pub value: f64,
-    /// Length of the piece, mm.
+    /// Length of the piece, in local tolerances.
     pub length: f64,
 }
 
-/// The largest value that pieces of `length_mm` in all reach, or half of the curve where that is less: a quantile by length, so that
+/// The largest value that pieces of `length` in all reach, or half of the curve where that is less: a quantile by length, so that
 /// no single edge decides. The maximum when the length is 0; 0 of nothing.
-pub(crate) fn lasting(mut pieces: Vec<Along>, length_mm: f64) -> f64 {
+pub(crate) fn lasting(mut pieces: Vec<Along>, length: f64) -> f64 {
     pieces.sort_unstable_by(|a, b| b.value.total_cmp(&a.value).then(a.length.total_cmp(&b.length)));
     let whole: f64 = pieces.iter().map(|p| p.length).sum();
-    let wanted = length_mm.min(0.5 * whole);
+    let wanted = length.min(0.5 * whole);
     let mut walked = 0.0;
     for piece in pieces {
         walked += piece.length;
@@ -70,8 +70,13 @@ fn lowest(complex: &Complex, values: &[f64], edge: u32) -> (u32, f64) {
         .unwrap_or((NONE, f64::INFINITY))
 }
 
-/// The axial chains with their persistence in the unit of `values`, in order of their smallest edge.
-pub(crate) fn axial_chains(complex: &Complex, values: &[f64], length_mm: f64) -> Vec<AxialChain> {
+/// The axial chains with their persistence along `length` tolerances in the unit of `values`, in order of their smallest edge.
+pub(crate) fn axial_chains(
+    complex: &Complex,
+    measure: &Measure,
+    values: &[f64],
+    length: f64,
+) -> Vec<AxialChain> {
     let degree = axial_degree(complex);
     let edges: Vec<u32> = (0..complex.fine.num_edges() as u32)
         .filter(|&e| complex.edge_alive[e as usize] && complex.edge_count[e as usize] >= 3)
@@ -95,17 +100,18 @@ pub(crate) fn axial_chains(complex: &Complex, values: &[f64], length_mm: f64) ->
         chains.entry(sets.find(i as u32)).or_default().push(e);
     }
     let piece = |&e: &u32| {
-        let [a, b] = complex.fine.edge_vertices[e as usize].map(|v| complex.fine.vertex_position[v as usize]);
+        let ends = &complex.fine.edge_vertices[e as usize];
+        let [a, b] = ends.map(|v| complex.fine.vertex_position[v as usize]);
         Along {
             // Triangles have three edges, so at most three facets meet at an edge: the third-highest is the lowest.
             value: lowest(complex, values, e).1,
-            length: a.distance(b),
+            length: a.distance(b) / measure.tolerance.over(ends),
         }
     };
     chains
         .into_values()
         .map(|edges| AxialChain {
-            persistence: lasting(edges.iter().map(piece).collect(), length_mm),
+            persistence: lasting(edges.iter().map(piece).collect(), length),
             edges,
         })
         .collect()
@@ -117,13 +123,13 @@ pub(crate) fn trim_fins(
     measure: &Measure,
     relative: &[f64],
     limit: f64,
-    length_mm: f64,
+    length: f64,
     wire: f64,
     fire: &mut WireFire,
     cover: &mut Cover,
     history: &mut Vec<Event>,
 ) -> usize {
-    let mut chains = axial_chains(complex, relative, length_mm);
+    let mut chains = axial_chains(complex, measure, relative, length);
     chains.retain(|c| c.persistence < limit);
     chains.sort_by(|a, b| {
         a.persistence

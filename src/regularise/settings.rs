@@ -55,7 +55,7 @@ pub struct RegulariseSettings {
     /// Wires are pruned at this many times the threshold of sheets, because the erosion thickness of a curve of finite
     /// sampling overshoots that of a sheet.
     pub wire: f64,
-    /// The persistence of an axial curve is what it has along this length, in tolerances, or along half of itself where that is less: its
+    /// The persistence of an axial curve is what it has along this length, in local tolerances, or along half of itself where that is less: its
     /// single most persistent edge is often at a node, where one facet more or less decides.
     pub persistence_length: f64,
     /// Longest seam, in tolerances: a gap between the end of an axial curve and a border that is narrower is closed. Over all pairs of

@@ -63,8 +63,8 @@ pub struct Regularised {
     /// Vertex of the medial ball nearest to each generator, where it had to be looked for.
     pub(crate) nearest_vertex: Vec<u32>,
     pub(crate) local_tolerance: Tolerance,
-    /// Length that the persistence of a curve is taken along, mm.
-    pub(crate) persistence_length_mm: f64,
+    /// Length that the persistence of a curve is taken along, in local tolerances.
+    pub(crate) persistence_length: f64,
 }
 
 impl Regularised {
@@ -253,7 +253,7 @@ impl<'a> Run<'a> {
                     &self.measure,
                     &self.relative,
                     self.cut,
-                    self.settings.persistence_length * self.measure.tolerance.largest(),
+                    self.settings.persistence_length,
                     self.settings.wire,
                     &mut self.fire,
                     cover,
@@ -379,7 +379,7 @@ impl<'a> Run<'a> {
                 Cost::Count => 0.0,
             },
             nearest_vertex,
-            persistence_length_mm: self.settings.persistence_length * tolerance_mm,
+            persistence_length: self.settings.persistence_length,
             local_tolerance: self.measure.tolerance,
         }
     }
